@@ -1,0 +1,1 @@
+"""``python -m ifsvideo.benchmark``: datasets, metrics, tables."""

@@ -1,0 +1,1 @@
+"""Overlay, CSV and every other thing written."""

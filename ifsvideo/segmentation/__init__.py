@@ -1,0 +1,1 @@
+"""In-frame shear: one stage a file, in the order they run."""

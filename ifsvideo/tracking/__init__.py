@@ -1,0 +1,1 @@
+"""Shi-Tomasi corners, pyramidal KLT, the birth and death of a track."""

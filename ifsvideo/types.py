@@ -1,0 +1,324 @@
+"""What travels between the stages: small frozen dataclasses that check themselves.
+
+Coordinates are pixels of the upright picture, x right and y down; the centre of the top-left pixel is (0, 0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+BACKGROUND = 0
+"""Label of the static world."""
+UNDECIDED = -1
+"""Label of a point without a decision, or fixed to the camera."""
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.floating[Any]]
+Ints = NDArray[np.integer[Any]]
+Bools = NDArray[np.bool_]
+
+Progress = Callable[[str, int, "int | None"], None]
+"""``progress(stage, done, total)``; ``total`` is None where it is not known."""
+
+
+@dataclass(frozen=True)
+class VideoInfo:
+    """What is known of a video before it is decoded.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the upright picture (rotation applied), pixels.
+    fps : Fraction
+        Frames per second, exact; the nominal constant rate of a variable one.
+    frames : int or None
+        Frames that the container promises; None where it says nothing. Never relied on.
+    sample_aspect : Fraction
+        Width of a pixel over its height, of the upright picture.
+    has_audio : bool
+        Whether the input carries sound.
+    start : float
+        Time of the first frame read, seconds of the input (``--start``).
+    """
+
+    width: int
+    height: int
+    fps: Fraction
+    frames: int | None = None
+    sample_aspect: Fraction = Fraction(1)
+    has_audio: bool = False
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"a picture has at least one pixel, got {self.width}x{self.height}")
+        if self.fps <= 0:
+            raise ValueError(f"fps must be positive, got {self.fps}")
+
+    def time_of(self, frame: int) -> float:
+        """Time of a frame, seconds of the input."""
+        return self.start + float(frame / self.fps)
+
+
+@dataclass(frozen=True)
+class FramePoints:
+    """The points that are seen in one frame.
+
+    Attributes
+    ----------
+    ids : (N,) int64
+        Track of each point; a track keeps its id while it lives, ids are never used again.
+    xy : (N, 2) float32
+        Position, pixels.
+    """
+
+    ids: NDArray[np.int64]
+    xy: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        if self.xy.shape != (len(self.ids), 2):
+            raise ValueError(f"expected xy of shape ({len(self.ids)}, 2), got {self.xy.shape}")
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Trajectories of P points over the F frames of one window.
+
+    Attributes
+    ----------
+    xy : (F, P, 2) float
+        Position, pixels; NaN where not visible.
+    visible : (F, P) bool
+        Whether the point was measured in the frame.
+    ids : (P,) int64
+        Name of each track.
+    size : (width, height) of the picture, pixels, or None where nobody told (then the points' extent stands in).
+    fps : frames per second, or None where nobody told.
+    """
+
+    xy: NDArray[np.float64]
+    visible: Bools
+    ids: NDArray[np.int64]
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.xy.ndim != 3 or self.xy.shape[2] != 2:
+            raise ValueError(f"expected xy of shape (F, P, 2), got {self.xy.shape}")
+        if self.visible.shape != self.xy.shape[:2]:
+            raise ValueError(f"expected visible of shape {self.xy.shape[:2]}, got {self.visible.shape}")
+        if self.ids.shape != (self.xy.shape[1],):
+            raise ValueError(f"expected ids of shape ({self.xy.shape[1]},), got {self.ids.shape}")
+        if not np.isfinite(self.xy[self.visible]).all():
+            raise ValueError("a visible point has a coordinate that is not finite")
+
+    @classmethod
+    def from_array(
+        cls,
+        xy: Any,
+        visible: Any = None,
+        ids: Any = None,
+        size: tuple[int, int] | None = None,
+        fps: float | None = None,
+    ) -> Tracks:
+        """Tracks from plain arrays: (F, P, 2), NaN or a mask (F, P) where a point is not seen."""
+        coordinates = np.array(xy, dtype=np.float64)
+        if coordinates.ndim != 3 or coordinates.shape[2] != 2:
+            raise ValueError(f"expected xy of shape (F, P, 2), got {coordinates.shape}")
+        seen = np.isfinite(coordinates).all(axis=2)
+        if visible is not None:
+            mask = np.asarray(visible, dtype=bool)
+            if mask.shape != seen.shape:
+                raise ValueError(f"expected visible of shape {seen.shape}, got {mask.shape}")
+            seen &= mask
+        coordinates[~seen] = np.nan
+        names = np.arange(coordinates.shape[1]) if ids is None else np.asarray(ids)
+        return cls(coordinates, seen, names.astype(np.int64), size, fps)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames F."""
+        return int(self.xy.shape[0])
+
+    @property
+    def points(self) -> int:
+        """Number of points P."""
+        return int(self.xy.shape[1])
+
+    @property
+    def W(self) -> NDArray[np.float64]:
+        """Trajectory matrix (2F, P), rows 2f and 2f+1 hold x and y of frame f (thesis eq. 1.1).
+
+        Raises
+        ------
+        ValueError
+            If a point is not visible in every frame; select such points first.
+        """
+        if not self.visible.all():
+            raise ValueError("W needs every point in every frame; use select(tracks.visible.all(axis=0))")
+        return np.ascontiguousarray(self.xy.transpose(0, 2, 1).reshape(2 * self.frames, self.points))
+
+    def select(self, points: Bools | Ints) -> Tracks:
+        """The tracks of some of the points: a mask (P,) or indices."""
+        return Tracks(self.xy[:, points], self.visible[:, points], self.ids[points], self.size, self.fps)
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """Labels of one window, and what each stage found on the way.
+
+    Attributes
+    ----------
+    labels : (P,) int64
+        0 background, 1, 2, ... moving, -1 undecided or fixed to the camera.
+    background : (P,) bool
+        Stage 1: what the epipolar split took for background.
+    segments : (P,) int64
+        Stage 4: the over-segmentation, -1 where a point was not part of it.
+    confidence : (P,) float64
+        How sure the label is: 0 (a guess) to 1.
+    details : mapping
+        Whatever else the stages kept for looking into: merge scores, energies, bounds.
+    """
+
+    labels: NDArray[np.int64]
+    background: Bools
+    segments: NDArray[np.int64]
+    confidence: NDArray[np.float64]
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("background", "segments", "confidence"):
+            shape = getattr(self, name).shape
+            if shape != self.labels.shape:
+                raise ValueError(f"expected {name} of shape {self.labels.shape}, got {shape}")
+
+
+@dataclass(frozen=True)
+class LabelTable:
+    """One row for every track and frame in which it is seen, ordered by frame, then track.
+
+    Attributes
+    ----------
+    frame : (N,) int32, from 0.
+    ids : (N,) int64, the track.
+    xy : (N, 2) float32, pixels.
+    labels : (N,) int32, as in `Segmentation`.
+    frames : int
+        Number of frames decoded, also those without a point.
+    """
+
+    frame: NDArray[np.int32]
+    ids: NDArray[np.int64]
+    xy: NDArray[np.float32]
+    labels: NDArray[np.int32]
+    frames: int
+
+    def __post_init__(self) -> None:
+        rows = len(self.frame)
+        for name, shape in (("ids", (rows,)), ("xy", (rows, 2)), ("labels", (rows,))):
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"expected {name} of shape {shape}, got {getattr(self, name).shape}")
+        if rows and (np.diff(self.frame) < 0).any():
+            raise ValueError("rows must be ordered by frame")
+
+    def at(self, frame: int) -> slice:
+        """The rows of one frame."""
+        start, stop = np.searchsorted(self.frame, [frame, frame + 1])
+        return slice(int(start), int(stop))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a renderer is told of one frame.
+
+    Attributes
+    ----------
+    frame : int, from 0.
+    time_s : float, seconds of the input.
+    ids : (N,) int64, xy : (N, 2) float32, labels : (N,) int32
+        The points seen in this frame.
+    trails : (T, N, 2) float32
+        Where these points were in the T frames up to this one, oldest first; NaN where they were not seen.
+    """
+
+    frame: int
+    time_s: float
+    ids: NDArray[np.int64]
+    xy: NDArray[np.float32]
+    labels: NDArray[np.int32]
+    trails: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class MovingObject:
+    """One object of the whole clip: its number, when it is seen first and last (seconds of the input), its tracks."""
+
+    label: int
+    first_s: float
+    last_s: float
+    tracks: int
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run found and wrote.
+
+    Attributes
+    ----------
+    info : VideoInfo
+    table : LabelTable
+    objects : tuple of MovingObject, by number
+    output, labels : Path or None
+        What was written.
+    warnings : tuple of str
+        What a user should know: frames missing, a side padded, no corner found.
+    seconds : mapping of stage name to seconds spent.
+    """
+
+    info: VideoInfo
+    table: LabelTable
+    objects: tuple[MovingObject, ...]
+    output: Path | None
+    labels: Path | None
+    warnings: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+class Tracker(Protocol):
+    """Turns frames into points that keep their id."""
+
+    def track(self, frames: Iterable[Image], ignore: Bools | None = None) -> Iterator[FramePoints]:
+        """Yield the points of every frame: exactly one item per frame, in order.
+
+        Parameters
+        ----------
+        frames : iterable of (H, W, 3) uint8, RGB
+        ignore : (H, W) bool, optional
+            True where the picture is not looked at.
+        """
+        ...
+
+
+class Segmenter(Protocol):
+    """Turns the tracks of one window into labels."""
+
+    def segment(self, tracks: Tracks, motions: int | None = None) -> Segmentation:
+        """Segment all frames as one window; ``motions`` tells the number of motions where it is known."""
+        ...
+
+
+class Renderer(Protocol):
+    """Draws what was found."""
+
+    def draw(self, image: Image, scene: Scene) -> Image:
+        """Return the picture (H, W, 3) uint8 RGB to be written; ``image`` must not be changed."""
+        ...
