@@ -14,7 +14,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-
 BACKGROUND = 0
 """Label of the static world."""
 UNDECIDED = -1
@@ -100,7 +99,7 @@ class Tracks:
         Whether the point was measured in the frame.
     ids : (P,) int64
         Name of each track.
-    size : (width, height) of the picture, pixels, or None where nobody told (then the points' extent stands in).
+    size : (width, height) of the picture, pixels, or None where nobody told (the points' extent stands in).
     fps : frames per second, or None where nobody told.
     """
 
@@ -133,12 +132,12 @@ class Tracks:
         coordinates = np.array(xy, dtype=np.float64)
         if coordinates.ndim != 3 or coordinates.shape[2] != 2:
             raise ValueError(f"expected xy of shape (F, P, 2), got {coordinates.shape}")
-        seen = np.isfinite(coordinates).all(axis=2)
+        seen = np.asarray(np.isfinite(coordinates).all(axis=2), dtype=bool)
         if visible is not None:
             mask = np.asarray(visible, dtype=bool)
             if mask.shape != seen.shape:
                 raise ValueError(f"expected visible of shape {seen.shape}, got {mask.shape}")
-            seen &= mask
+            seen = np.logical_and(seen, mask)
         coordinates[~seen] = np.nan
         names = np.arange(coordinates.shape[1]) if ids is None else np.asarray(ids)
         return cls(coordinates, seen, names.astype(np.int64), size, fps)
@@ -260,7 +259,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class MovingObject:
-    """One object of the whole clip: its number, when it is seen first and last (seconds of the input), its tracks."""
+    """One object of a clip: its number, first and last sight (seconds of the input), number of tracks."""
 
     label: int
     first_s: float
