@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ifsvideo.errors import UsageError
 from ifsvideo.segmentation.config import SegmenterConfig
 
 
@@ -16,6 +17,49 @@ class TrackerConfig:
 
     max_points: int = 1000
     """Points alive at once; about what two cores track as fast as 1280x720 plays."""
+    cells: int = 96
+    """Cells of the grid that spreads the corners (12 x 8 on a 3:2 picture); a cell is about as large as the
+    smallest object that is to be told apart."""
+    crowding: float = 2.0
+    """Most points of a cell, in fair shares (max_points / cells): more and a textured corner takes all the
+    points, fewer and the sky's share goes unused."""
+    min_distance: float = 0.008
+    """Least distance of a new corner to its neighbours, share of the diagonal: 6 px at 640x360. Half the
+    spacing of 1000 points spread evenly, so that small objects still get several."""
+    quality: float = 0.02
+    """Least corner strength (smaller eigenvalue), share of the strongest of the cell. OpenCV's examples take
+    0.01 of the whole picture's; a cell has less range."""
+    min_contrast: float = 2.0
+    """Least strength of any corner: RMS grey levels per pixel across the weaker direction. Noise with a
+    standard deviation of 4 grey levels stays below it after Sobel's smoothing (factor sqrt(12) / 8)."""
+    birth_interval: int = 3
+    """Frames between two searches for new corners; at 30 a second an empty place is filled within 0.1 s."""
+    window: int = 21
+    """Side of the KLT window, pixels, odd; smaller on small pictures. OpenCV's default."""
+    max_return_error: float = 0.001
+    """Greatest distance between a point and itself tracked forward and back, share of the diagonal: 0.7 px at
+    640x360 (Kalal et al., Forward-Backward Error, ICPR 2010)."""
+    max_step: float = 0.15
+    """Longest step between two frames, share of the diagonal; further, KLT's pyramid finds by chance only."""
+    min_similarity: float = 0.6
+    """Least correlation of the patch with that of the frame before; other surfaces' is 0 +- 0.3."""
+    margin: float = 0.01
+    """Distance from the picture's edge at which a track ends, share of the diagonal: the window looks out."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.max_points <= 30000:
+            raise UsageError(f"tracking.max_points must be 1 to 30000, got {self.max_points}")
+        if self.window < 5 or self.window % 2 == 0:
+            raise UsageError(f"tracking.window must be odd and at least 5, got {self.window}")
+        for name in ("cells", "birth_interval"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"tracking.{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("crowding", "min_distance", "min_contrast", "max_return_error", "max_step"):
+            if not getattr(self, name) > 0:
+                raise UsageError(f"tracking.{name} must be positive, got {getattr(self, name)}")
+        for name in ("quality", "min_similarity", "margin"):
+            if not 0 <= getattr(self, name) < 1:
+                raise UsageError(f"tracking.{name} must be at least 0 and below 1, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,173 @@
+"""From frames to points that keep their number: a track's birth, life and death."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ifsvideo.config import TrackerConfig
+from ifsvideo.errors import UsageError
+from ifsvideo.tracking.appearance import correlation, cut
+from ifsvideo.tracking.corners import find_corners
+from ifsvideo.tracking.klt import Search, flatten, follow
+from ifsvideo.types import Bools, FramePoints, Image
+
+SMALLEST = 16
+"""Least side of a picture that is searched, pixels; smaller ones hold no window and have no points."""
+LARGEST = 2300.0
+"""Greatest diagonal that is tracked in full resolution, pixels (1920x1080 is); larger pictures are halved.
+KLT's window stays 21 px, and what it sees of a 4K picture is then what it sees of a 1080-line one."""
+SUDDEN_LOSS = 0.3
+"""Share of the tracks whose loss in one frame points to a jump of exposure (or a cut): worth a second try."""
+COLLAPSED = 0.4
+"""Share of the least distance of corners below which two tracks follow the same thing."""
+
+
+class KltTracker:
+    """Shi-Tomasi corners followed by pyramidal KLT; a `ifsvideo.types.Tracker`.
+
+    Parameters
+    ----------
+    config : TrackerConfig, optional
+    """
+
+    def __init__(self, config: TrackerConfig | None = None) -> None:
+        self.config = config or TrackerConfig()
+
+    def track(self, frames: Iterable[Image], ignore: Bools | None = None) -> Iterator[FramePoints]:
+        """Yield the points of every frame, ordered by id: exactly one item per frame.
+
+        Parameters
+        ----------
+        frames : iterable of (H, W, 3) uint8, RGB, all of one size
+        ignore : (H, W) bool, optional
+            True where no point is born and where living ones end.
+
+        Raises
+        ------
+        UsageError
+            If ``ignore`` has another size than the frames.
+        """
+        life: _Life | None = None
+        for frame in frames:
+            if life is None:
+                life = _Life(frame.shape[1], frame.shape[0], ignore, self.config)
+            yield life.advance(frame)
+
+
+class _Life:
+    """The living tracks of one clip, and the frame in which they were last seen."""
+
+    def __init__(self, width: int, height: int, ignore: Bools | None, config: TrackerConfig) -> None:
+        if ignore is not None and ignore.shape != (height, width):
+            raise UsageError(
+                f"the ignore mask is {ignore.shape[1]}x{ignore.shape[0]}, the frames are {width}x{height}; "
+                "give a mask of the frames' size"
+            )
+        self.config = config
+        self.shrink = 1
+        while math.hypot(width, height) / self.shrink > LARGEST:
+            self.shrink *= 2
+        self.width, self.height = max(1, width // self.shrink), max(1, height // self.shrink)
+        self.full_size = (width, height)
+        self.diagonal = math.hypot(self.width, self.height)
+        self.search = Search.for_picture(self.width, self.height, config.window)
+        self.allowed = self._allowed(ignore)
+        self.ids = np.empty(0, np.int64)
+        self.xy = np.empty((0, 2), np.float32)
+        self.previous: Image | None = None
+        self.next_id = 0
+        self.frame = 0
+        self.after_birth = 0
+
+    def advance(self, frame: Image) -> FramePoints:
+        """Take the next frame; return the points seen in it."""
+        grey = self._grey(frame)
+        if min(grey.shape) >= SMALLEST:
+            if self.previous is not None:
+                self._live(self.previous, grey)
+            few = len(self.ids) < (1 - SUDDEN_LOSS) * self.after_birth
+            if few or self.frame % self.config.birth_interval == 0:
+                self._bear(grey)
+        self.previous = grey
+        self.frame += 1
+        return FramePoints(self.ids, self._in_full_size(self.xy))
+
+    def _live(self, before: Image, after: Image) -> None:
+        """Follow every track to the next frame; those that fail a check end."""
+        moved, alive = self._step(before, after, self.xy)
+        if len(alive) and np.mean(~alive) > SUDDEN_LOSS:
+            lost = np.flatnonzero(~alive)
+            again, found = self._step(flatten(before), flatten(after), self.xy[lost])
+            moved[lost[found]] = again[found]
+            alive[lost[found]] = True
+        alive &= self._inside(moved)
+        self.ids, self.xy = self.ids[alive], moved[alive]
+        distinct = self._distinct(self.xy)
+        self.ids, self.xy = self.ids[distinct], self.xy[distinct]
+
+    def _step(
+        self, before: Image, after: Image, xy: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], Bools]:
+        """Points in the next frame, and which of them can be believed."""
+        config = self.config
+        moved, return_error = follow(before, after, xy, self.search)
+        believed = return_error <= max(0.5, config.max_return_error * self.diagonal)
+        believed &= np.hypot(*(moved - xy).T) <= config.max_step * self.diagonal
+        radius = self.search.window // 3
+        similar = correlation(cut(before, xy, radius), cut(after, moved, radius))
+        return moved, believed & (similar >= config.min_similarity)
+
+    def _bear(self, grey: Image) -> None:
+        """Let new tracks begin where the picture has room."""
+        born = find_corners(grey, self.xy, self.allowed, self.config)
+        self.ids = np.concatenate([self.ids, self.next_id + np.arange(len(born), dtype=np.int64)])
+        self.xy = np.concatenate([self.xy, born])
+        self.next_id += len(born)
+        self.after_birth = len(self.ids)
+
+    def _inside(self, xy: NDArray[np.float32]) -> Bools:
+        """Whether each point lies where the picture is looked at."""
+        column, row = np.rint(np.nan_to_num(xy, nan=-1)).astype(np.int64).T
+        within = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
+        within[within] = self.allowed[row[within], column[within]]
+        return np.asarray(within, bool)
+
+    def _distinct(self, xy: NDArray[np.float32]) -> Bools:
+        """Whether each track, in the order of age, has its place for itself; of two, the younger has not."""
+        keep = np.ones(len(xy), bool)
+        if len(xy) > 1:
+            distance = COLLAPSED * max(2.0, self.config.min_distance * self.diagonal)
+            keep[cKDTree(xy).query_pairs(distance, output_type="ndarray").max(axis=1)] = False
+        return keep
+
+    def _allowed(self, ignore: Bools | None) -> Bools:
+        """Where points may be: off the margin and off the mask (H, W), in the size that is tracked."""
+        allowed = np.zeros((self.height, self.width), bool)
+        edge = max(2, round(self.config.margin * self.diagonal))
+        allowed[edge : self.height - edge, edge : self.width - edge] = True
+        if ignore is not None:
+            masked = cv2.resize(
+                ignore.astype(np.float32), (self.width, self.height), interpolation=cv2.INTER_AREA
+            )
+            allowed &= masked == 0
+        return allowed
+
+    def _grey(self, frame: Image) -> Image:
+        width, height = self.full_size
+        if frame.shape != (height, width, 3):
+            raise ValueError(f"expected frames of shape ({height}, {width}, 3), got {frame.shape}")
+        grey = cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
+        if self.shrink > 1:
+            grey = cv2.resize(grey, (self.width, self.height), interpolation=cv2.INTER_AREA)
+        return np.asarray(grey, np.uint8)
+
+    def _in_full_size(self, xy: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Pixels of the frame as it came: the centre of the top-left pixel is (0, 0) in both sizes."""
+        scale = np.array(self.full_size, np.float64) / (self.width, self.height)
+        return np.asarray((xy + 0.5) * scale - 0.5, np.float32)
