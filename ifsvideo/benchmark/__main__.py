@@ -37,7 +37,7 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from ifsvideo.benchmark import datasets, table
+from ifsvideo.benchmark import datasets, samples, table
 from ifsvideo.benchmark.runner import IFSFactory, Report, run_points
 from ifsvideo.config import Config
 from ifsvideo.errors import IfsVideoError, OutputError, UsageError
@@ -73,7 +73,7 @@ def _parser() -> argparse.ArgumentParser:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("dataset", metavar="DATASET", choices=("hopkins155", "kt3dmoseg"))
+    parser.add_argument("dataset", metavar="DATASET", choices=("hopkins155", "kt3dmoseg", "samples"))
     parser.add_argument("folder", metavar="DIR", type=Path, help="where the data set lies")
     parser.add_argument("--runs", metavar="N", type=_positive, default=1, help="runs of every sequence (1)")
     parser.add_argument("--seed", metavar="S", type=int, default=0, help="seed of the first run (0)")
@@ -105,12 +105,22 @@ def _terminate(*_: object) -> NoReturn:
 
 
 def _measure(options: argparse.Namespace, config: Config) -> Report:
+    if options.dataset == "samples":
+        if options.motions_known:
+            raise UsageError(
+                "--motions-known: a pipeline finds the number itself; leave the option out for samples"
+            )
+        chosen = samples.clips(options.folder, options.only)
+        factory = samples.PipelineFactory(config)
+        return samples.run_samples(chosen, factory, options.runs, options.seed, options.jobs)
     sequences = datasets.load(options.dataset, options.folder, options.only)
-    factory = IFSFactory(config.segmentation)
-    return run_points(sequences, factory, options.runs, options.seed, options.jobs, options.motions_known)
+    make = IFSFactory(config.segmentation)
+    return run_points(sequences, make, options.runs, options.seed, options.jobs, options.motions_known)
 
 
 def _as_table(report: Report, verbose: bool) -> str:
+    if report["dataset"] == "samples":
+        return table.samples(report)
     return table.points(report, by_sequence=verbose or report["dataset"] == "kt3dmoseg")
 
 

@@ -70,3 +70,22 @@ def _footer(report: Report) -> str:
     if report["dataset"] == "kt3dmoseg":
         lines.append(f"moves: precision % {_text(moves['precision'])}, recall % {_text(moves['recall'])}")
     return "\n".join(lines)
+
+
+def samples(report: Report) -> str:
+    """The table of the sample clips: a line for each clip, then the mean."""
+    columns = {
+        "clip": "name",
+        "found %": "found",
+        "false %": "false",
+        "undecided %": "undecided",
+        "IDF1 %": "idf1",
+        "objects": "objects",
+        "true": "true_objects",
+        "longest false s": "longest_false_s",
+        "seconds": "seconds",
+    }
+    lines = (*report["clips"], {"name": "mean", **report["mean"]})
+    rows = [[line[field] for field in columns.values()] for line in lines]
+    title = f"samples: {len(report['clips'])} clips, {report['runs']} runs"
+    return f"{title}\n\n{align(tuple(columns), rows)}"
