@@ -68,6 +68,21 @@ class OverlayConfig:
 
     legend: bool = True
     """Whether the small legend is drawn."""
+    trail_s: float = 0.3
+    """Length of the trails, seconds: long enough to show where a point goes, short enough not to tangle."""
+    hull_opacity: float = 0.2
+    """How strongly an object's colour covers it, 0 to 1; more and the object itself is hard to see."""
+    picture_brightness: float = 0.7
+    """Brightness of the picture behind the drawing, 0 to 1; the palest colour still stands out on a white sky."""
+    picture_colour: float = 0.55
+    """Share of the picture's own colour that is kept, 0 to 1, so that a red car is not taken for a label."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.trail_s <= 10.0:
+            raise UsageError(f"overlay.trail_s must be 0 to 10, got {self.trail_s}")
+        for name in ("hull_opacity", "picture_brightness", "picture_colour"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise UsageError(f"overlay.{name} must be 0 to 1, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
