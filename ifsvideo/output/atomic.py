@@ -1,0 +1,171 @@
+"""Outputs that appear complete or not at all.
+
+Every output is written under a hidden name beside its place (so on the same disk) and moved there when complete.
+Several outputs of one run are placed together: if one cannot be, none is, and what stood there before stands there
+again.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from ifsvideo.errors import OutputError
+
+
+def check_writable(target: Path) -> None:
+    """Refuse a place where no file can be written, before any work is done.
+
+    Raises
+    ------
+    OutputError
+        If the folder is missing or not writable, or if the target is a folder, a device or a protected file.
+    """
+    folder = target.parent
+    if target.is_dir():
+        raise OutputError(f"{target}: is a folder; name a file in it")
+    if not folder.is_dir():
+        raise OutputError(f"{target}: the folder {folder} does not exist; create it first")
+    if target.exists() and not target.is_file():
+        raise OutputError(f"{target}: is not a regular file; name another output")
+    real_folder = _real(target).parent
+    if not os.access(real_folder, os.W_OK | os.X_OK):
+        raise OutputError(f"{target}: no permission to write in {real_folder}; name another folder")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise OutputError(f"{target}: exists and is write-protected; name another output or allow writing")
+
+
+def output_error(target: Path, error: OSError) -> OutputError:
+    """The one line for a system error met while writing ``target``."""
+    reason = error.strerror or str(error)
+    return OutputError(f"{target}: cannot be written ({reason}); free space or name another place")
+
+
+class Outputs:
+    """Files being written, placed together when the context ends well and removed when it does not.
+
+    Examples
+    --------
+    ::
+
+        with Outputs() as outputs:
+            video = outputs.add(Path("out.mp4"))  # write to these two ...
+            table = outputs.add(Path("out.csv"))
+        # ... and from here on both stand in their places
+    """
+
+    def __init__(self) -> None:
+        self._staged: list[tuple[Path, Path]] = []
+        self._scratch: list[Path] = []
+
+    def add(self, target: Path) -> Path:
+        """Name of an empty hidden file, with the target's ending, to be written in its stead.
+
+        A symbolic link is followed: the file it names is replaced, the link stays. The mode is that of the
+        file replaced, or of any new file (umask).
+
+        Raises
+        ------
+        OutputError
+            If `check_writable` refuses the target or the file cannot be created.
+        """
+        check_writable(target)
+        real = _real(target)
+        temporary = _hidden(real)
+        self._staged.append((temporary, real))  # before it exists: an interruption must not strand it
+        try:
+            os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            if real.exists():
+                os.chmod(temporary, stat.S_IMODE(real.stat().st_mode))
+        except OSError as error:
+            raise output_error(target, error) from None
+        return temporary
+
+    def add_scratch(self, beside: Path) -> Path:
+        """Name of a hidden file on the same disk, not yet there, that is removed in the end."""
+        self._scratch.append(_hidden(beside))
+        return self._scratch[-1]
+
+    def commit(self) -> None:
+        """Move every file to its place; if one cannot be moved, undo the others.
+
+        Raises
+        ------
+        OutputError
+            If a file cannot be moved.
+        """
+        placing: list[tuple[Path, Path, Path]] = []
+        try:
+            for temporary, real in self._staged:
+                placing.append((temporary, real, _hidden(real)))
+                if len(self._staged) > 1 and real.exists():
+                    _keep_old(real, placing[-1][2])
+                os.replace(temporary, real)
+        except BaseException as error:
+            for temporary, real, backup in reversed(placing):
+                _undo(real, backup, placed=not temporary.exists())
+            if isinstance(error, OSError):
+                raise output_error(placing[-1][1], error) from None
+            raise
+        for _, _, backup in placing:
+            backup.unlink(missing_ok=True)
+        self._staged.clear()
+
+    def discard(self) -> None:
+        """Remove what was written and not placed; the targets are untouched."""
+        for temporary in [*(file for file, _ in self._staged), *self._scratch]:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        self._staged.clear()
+        self._scratch.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self.commit()
+        finally:
+            self.discard()
+
+
+@contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """One output: yields the file to write, which takes the target's place if the block ends well."""
+    with Outputs() as outputs:
+        yield outputs.add(target)
+
+
+def _real(target: Path) -> Path:
+    return Path(os.path.realpath(target))
+
+
+def _hidden(real: Path) -> Path:
+    return real.with_name(f".ifsvideo-{secrets.token_hex(6)}{real.suffix}")
+
+
+def _keep_old(real: Path, backup: Path) -> None:
+    """Give the file that stands at ``real`` a second name."""
+    try:
+        os.link(real, backup)
+    except OSError:  # a file system without hard links
+        os.rename(real, backup)
+
+
+def _undo(real: Path, backup: Path, *, placed: bool) -> None:
+    """Put back what stood at ``real``: the file kept as ``backup``, or nothing."""
+    with suppress(OSError):
+        if backup.exists():
+            os.replace(backup, real)
+            backup.unlink(missing_ok=True)  # replace() does nothing where both names are one file
+        elif placed:
+            real.unlink(missing_ok=True)

@@ -1,0 +1,142 @@
+"""The ffmpeg that imageio-ffmpeg brings, as a child that never outlives its purpose.
+
+imageio-ffmpeg's own reader and writer are not used: the reader lets ffmpeg repeat and drop frames, tells the rate in
+two decimals and leaves a killed child unreaped; the writer has no atomic output and no exact rate.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import threading
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+import imageio_ffmpeg
+
+from ifsvideo.errors import IfsVideoError
+
+_KEPT_LINES = 60
+"""Lines of complaint kept of a child that may complain about every frame."""
+
+
+def executable() -> str:
+    """Path of the ffmpeg binary (``IMAGEIO_FFMPEG_EXE`` overrides the bundled one).
+
+    Raises
+    ------
+    IfsVideoError
+        If there is none for this platform.
+    """
+    try:
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError as error:
+        raise IfsVideoError(
+            f"no ffmpeg found; reinstall imageio-ffmpeg or set IMAGEIO_FFMPEG_EXE ({error})"
+        ) from None
+
+
+def file_url(path: Path) -> str:
+    """The path as ffmpeg takes it literally: no protocol, no option, no pattern in it."""
+    return f"file:{path.absolute()}"
+
+
+class Ffmpeg:
+    """A running ffmpeg; leaving the context kills it if it still runs, and reaps it in any case.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What follows ``ffmpeg -hide_banner -nostdin``.
+    feeds : bool
+        True if the child reads ``stdin`` from us, False if we read its ``stdout``.
+    """
+
+    def __init__(self, arguments: Sequence[str], *, feeds: bool = False) -> None:
+        command = [executable(), "-hide_banner", *([] if feeds else ["-nostdin"]), *arguments]
+        # A session of its own: Ctrl-C in the terminal reaches Python alone, which then decides about the child.
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE if feeds else subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL if feeds else subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+        self._lines: deque[str] = deque(maxlen=_KEPT_LINES)
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+
+    def _listen(self) -> None:
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            text = line.decode("utf-8", "replace").strip()
+            if text:
+                self._lines.append(text)
+
+    @property
+    def stdin(self) -> IO[bytes]:
+        """What the child reads."""
+        assert self._process.stdin is not None
+        return self._process.stdin
+
+    @property
+    def stdout(self) -> IO[bytes]:
+        """What the child writes."""
+        assert self._process.stdout is not None
+        return self._process.stdout
+
+    @property
+    def pid(self) -> int:
+        """Process id of the child."""
+        return self._process.pid
+
+    def wait(self) -> int:
+        """Exit status of the child, once it has ended by itself; negative: the signal that killed it."""
+        status = self._process.wait()
+        self._listener.join()
+        return status
+
+    def complaints(self) -> list[str]:
+        """The last lines that the child wrote to stderr; complete only after `wait`."""
+        return list(self._lines)
+
+    def stop(self) -> None:
+        """Kill the child if it still runs, reap it, close the pipes."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.wait()
+        self._listener.join()
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            if pipe is not None:
+                try:
+                    pipe.close()
+                except BrokenPipeError:
+                    pass  # what was still buffered for a dead child is lost on purpose
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+def run(arguments: Sequence[str]) -> tuple[int, str, list[str]]:
+    """Run ffmpeg to its end.
+
+    Returns
+    -------
+    status : int
+        Exit status.
+    output : str
+        What it wrote to stdout.
+    complaints : list of str
+        The last lines of stderr.
+    """
+    with Ffmpeg(arguments) as child:
+        output = child.stdout.read().decode("utf-8", "replace")
+        status = child.wait()
+        return status, output, child.complaints()

@@ -1,0 +1,252 @@
+"""H.264 files that play in a browser, written through ffmpeg and placed when complete."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+
+from ifsvideo.errors import OutputError, UsageError
+from ifsvideo.output.atomic import Outputs, check_writable
+from ifsvideo.types import Image, VideoInfo
+from ifsvideo.video import ffmpeg
+from ifsvideo.video.probe import audio_codec, count_frames
+
+FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
+"""Output endings and ffmpeg's name of the container."""
+_COPIED_SOUND = {
+    ".mp4": {"aac", "mp3", "opus"},
+    ".mov": {"aac", "mp3", "alac", "pcm_s16le", "pcm_s24le"},
+    ".mkv": {"aac", "mp3", "opus", "vorbis", "flac", "ac3", "eac3", "pcm_s16le"},
+}
+"""Codecs that the container holds and common players play; other sound is encoded again, as AAC."""
+_ENCODER = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-threads", "2"]
+# One matrix for every size, and the tags that say so: players guess by the size where tags are missing.
+_COLOURS = (
+    "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p,"
+    "setparams=range=tv:colorspace=bt709:color_primaries=bt709:color_trc=bt709"
+)
+
+
+def check_output(path: Path, source: Path | None = None) -> None:
+    """Refuse an output before any work is done.
+
+    Parameters
+    ----------
+    path : Path
+        Video to be written: .mp4, .mov or .mkv.
+    source : Path, optional
+        Input, which must be another file (also by another name of it).
+
+    Raises
+    ------
+    UsageError
+        If the ending is another, or the output is the input.
+    OutputError
+        If nothing can be written there.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UsageError(f"{path}: unknown ending {path.suffix!r}; name an output in {', '.join(FORMATS)}")
+    if source is not None and path.exists() and source.exists() and os.path.samefile(path, source):
+        raise UsageError(f"{path}: is the input itself; name another output")
+    check_writable(path)
+
+
+class VideoWriter:
+    """Writes frames to an H.264 file: yuv420p, constant rate, faststart.
+
+    The file appears at its place when the context ends well; otherwise nothing is left and an older file stays.
+
+    Parameters
+    ----------
+    path : Path
+        .mp4, .mov or .mkv.
+    info : VideoInfo
+        Size, rate and pixel aspect of the frames; ``info.start`` is where in ``audio_from`` the sound begins.
+    audio_from : Path, optional
+        File whose first sound stream is kept, for as long as the video is: copied where it is taken from its beginning and
+        the container holds its codec, else encoded as AAC, cut to the sample.
+    outputs : Outputs, optional
+        Group with which the file is placed; alone by default.
+
+    Attributes
+    ----------
+    warnings : tuple of str
+        What a user should know; complete after the context has ended.
+    frames : int
+        Frames written so far.
+
+    Raises
+    ------
+    UsageError, OutputError
+        As `check_output`; `OutputError` also if ffmpeg fails, the disk is full or no frame was written.
+
+    Examples
+    --------
+    ::
+
+        with VideoWriter(Path("out.mp4"), source.info, audio_from=source.path) as writer:
+            for image in frames:
+                writer.write(image)
+    """
+
+    def __init__(
+        self, path: Path, info: VideoInfo, *, audio_from: Path | None = None, outputs: Outputs | None = None
+    ) -> None:
+        check_output(path)
+        self.path = path
+        self.frames = 0
+        self.warnings: tuple[str, ...] = ()
+        self._info = info
+        self._audio_from = audio_from
+        self._group = outputs
+        self._pad = (info.height % 2, info.width % 2)
+        if any(self._pad):
+            width, height = info.width + self._pad[1], info.height + self._pad[0]
+            self._warn(f"padded by one pixel to {width}x{height}: H.264 needs even sides")
+
+    @property
+    def padded(self) -> bool:
+        """Whether an odd side is padded by one pixel (a repetition of the last row or column)."""
+        return any(self._pad)
+
+    def __enter__(self) -> Self:
+        self._own = Outputs()
+        try:
+            self._target = (self._group or self._own).add(self.path)
+            # With sound, the pictures go to a file of their own first: only when all are written is the length known.
+            self._pictures = self._own.add_scratch(self._target) if self._audio_from else self._target
+            self._child = ffmpeg.Ffmpeg(self._arguments(), feeds=True)
+        except BaseException:
+            self._own.discard()
+            raise
+        return self
+
+    def write(self, image: Image) -> None:
+        """Append one frame.
+
+        Parameters
+        ----------
+        image : (H, W, 3) uint8
+            RGB, of the size promised by ``info``.
+
+        Raises
+        ------
+        ValueError
+            If shape or type differ.
+        OutputError
+            If ffmpeg has died, for instance because the disk is full.
+        """
+        expected = (self._info.height, self._info.width, 3)
+        if image.shape != expected or image.dtype != np.uint8:
+            raise ValueError(f"expected uint8 image of shape {expected}, got {image.dtype} {image.shape}")
+        if self.padded:
+            image = cv2.copyMakeBorder(image, 0, self._pad[0], 0, self._pad[1], cv2.BORDER_REPLICATE)
+        try:
+            self._child.stdin.write(memoryview(np.ascontiguousarray(image)).cast("B"))
+        except OSError:
+            self._child.wait()
+            raise self._failure(self._child.complaints()) from None
+        self.frames += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._finish()
+        except BaseException as failure:
+            kind, error, trace = type(failure), failure, failure.__traceback__
+            raise
+        finally:
+            self._child.stop()
+            self._own.__exit__(kind, error, trace)
+
+    def _finish(self) -> None:
+        """Let ffmpeg end, add the sound, make sure that all is there."""
+        try:
+            self._child.stdin.close()
+        except OSError:
+            pass  # ffmpeg has died; its exit status says more
+        status = self._child.wait()
+        if self.frames == 0:
+            raise OutputError(f"{self.path}: no frame was written; nothing is left to place there")
+        if status != 0:
+            raise self._failure(self._child.complaints())
+        if self._audio_from is not None:
+            self._add_sound(self._audio_from)
+        placed = count_frames(self._target)
+        if placed != self.frames:  # a full disk does not always make ffmpeg fail
+            raise self._failure([*self._child.complaints(), f"{placed} of {self.frames} frames arrived"])
+
+    def _arguments(self) -> list[str]:
+        info = self._info
+        width, height = info.width + self._pad[1], info.height + self._pad[0]
+        aspect = f"setsar=sar={info.sample_aspect.numerator}/{info.sample_aspect.denominator}:max=65535"
+        return [
+            *(
+                "-loglevel",
+                "error",
+                "-f",
+                "rawvideo",
+                "-pix_fmt",
+                "rgb24",
+                "-video_size",
+                f"{width}x{height}",
+            ),
+            *("-framerate", str(info.fps), "-i", "pipe:0", "-vf", f"{_COLOURS},{aspect}"),
+            *(*_ENCODER, "-fps_mode", "passthrough"),
+            *self._destination(self._pictures),
+        ]
+
+    def _destination(self, file: Path) -> list[str]:
+        container = FORMATS[self.path.suffix.lower()]
+        faststart = [] if container == "matroska" else ["-movflags", "+faststart"]
+        return [*faststart, "-f", container, "-y", ffmpeg.file_url(file)]
+
+    def _add_sound(self, source: Path) -> None:
+        """Join pictures and sound; without sound, and with a warning, where the sound cannot be read."""
+        codec = audio_codec(source)
+        whole = self._info.start < 0.5 / self._info.fps
+        attempts = [["-c:a", "aac", "-b:a", "160k"]]
+        if whole and codec in _COPIED_SOUND[self.path.suffix.lower()]:
+            attempts.insert(0, ["-c:a", "copy"])
+        complaints: list[str] = []
+        for attempt in attempts if codec else []:
+            complaints = self._join(source, attempt)
+            if not complaints:
+                return
+        self._warn("the sound could not be kept" + (f" (ffmpeg: {complaints[-1]})" if complaints else ""))
+        os.replace(self._pictures, self._target)
+
+    def _join(self, source: Path, codec: list[str]) -> list[str]:
+        """Write pictures and sound to the target; returns what ffmpeg complained of, if it failed."""
+        length = math.ceil(1e6 * self.frames / self._info.fps)
+        status, _, complaints = ffmpeg.run(
+            [
+                *("-loglevel", "error", "-i", ffmpeg.file_url(self._pictures)),
+                *("-ss", f"{self._info.start:.6f}", "-vn", "-i", ffmpeg.file_url(source)),
+                *("-map", "0:v", "-map", "1:a:0", "-c:v", "copy", *codec, "-t", f"{length}us"),
+                *self._destination(self._target),
+            ]
+        )
+        if "No space left on device" in "\n".join(complaints):
+            raise self._failure(complaints)
+        return [] if status == 0 else complaints or [f"exit status {status}"]
+
+    def _warn(self, text: str) -> None:
+        self.warnings = (*self.warnings, f"{self.path}: {text}")
+
+    def _failure(self, complaints: list[str]) -> OutputError:
+        text = "\n".join(complaints)
+        if "No space left on device" in text:
+            return OutputError(f"{self.path}: the disk is full; free space or name another place")
+        reason = complaints[-1] if complaints else "it was killed"
+        return OutputError(
+            f"{self.path}: ffmpeg could not write the video ({reason}); check the disk and memory"
+        )
