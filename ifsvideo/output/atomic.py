@@ -1,8 +1,8 @@
 """Outputs that appear complete or not at all.
 
-Every output is written under a hidden name beside its place (so on the same disk) and moved there when complete.
-Several outputs of one run are placed together: if one cannot be, none is, and what stood there before stands there
-again.
+Every output is written under a hidden name beside its place (so on the same disk) and moved there when
+complete. Several outputs of one run are placed together: if one cannot be, none is, and what stood there
+before stands there again.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The ffmpeg that imageio-ffmpeg brings, as a child that never outlives its purpose.
 
-imageio-ffmpeg's own reader and writer are not used: the reader lets ffmpeg repeat and drop frames, tells the rate in
-two decimals and leaves a killed child unreaped; the writer has no atomic output and no exact rate.
+imageio-ffmpeg's own reader and writer are not used: the reader lets ffmpeg repeat and drop frames, tells the
+rate in two decimals and leaves a killed child unreaped; the writer has no atomic output and no exact rate.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import subprocess
 import threading
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
+from io import BufferedReader
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -18,8 +20,8 @@ import imageio_ffmpeg
 
 from ifsvideo.errors import IfsVideoError
 
-_KEPT_LINES = 60
-"""Lines of complaint kept of a child that may complain about every frame."""
+_KEPT_LINES = 1000
+"""Last lines kept of a child that may complain about every frame; a header has some dozens."""
 
 
 def executable() -> str:
@@ -32,10 +34,8 @@ def executable() -> str:
     """
     try:
         return str(imageio_ffmpeg.get_ffmpeg_exe())
-    except RuntimeError as error:
-        raise IfsVideoError(
-            f"no ffmpeg found; reinstall imageio-ffmpeg or set IMAGEIO_FFMPEG_EXE ({error})"
-        ) from None
+    except RuntimeError:
+        raise IfsVideoError("no ffmpeg found; reinstall imageio-ffmpeg or set IMAGEIO_FFMPEG_EXE") from None
 
 
 def file_url(path: Path) -> str:
@@ -56,7 +56,7 @@ class Ffmpeg:
 
     def __init__(self, arguments: Sequence[str], *, feeds: bool = False) -> None:
         command = [executable(), "-hide_banner", *([] if feeds else ["-nostdin"]), *arguments]
-        # A session of its own: Ctrl-C in the terminal reaches Python alone, which then decides about the child.
+        # A session of its own: Ctrl-C in the terminal reaches Python alone, which decides about the child.
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE if feeds else subprocess.DEVNULL,
@@ -82,9 +82,9 @@ class Ffmpeg:
         return self._process.stdin
 
     @property
-    def stdout(self) -> IO[bytes]:
+    def stdout(self) -> BufferedReader:
         """What the child writes."""
-        assert self._process.stdout is not None
+        assert isinstance(self._process.stdout, BufferedReader)
         return self._process.stdout
 
     @property
@@ -98,8 +98,8 @@ class Ffmpeg:
         self._listener.join()
         return status
 
-    def complaints(self) -> list[str]:
-        """The last lines that the child wrote to stderr; complete only after `wait`."""
+    def printed(self) -> list[str]:
+        """The last lines that the child wrote to stderr; complete after `wait` or `stop`."""
         return list(self._lines)
 
     def stop(self) -> None:
@@ -110,10 +110,8 @@ class Ffmpeg:
         self._listener.join()
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
-                try:
+                with suppress(BrokenPipeError):  # what was still buffered for a dead child is lost
                     pipe.close()
-                except BrokenPipeError:
-                    pass  # what was still buffered for a dead child is lost on purpose
 
     def __enter__(self) -> Self:
         return self
@@ -139,4 +137,4 @@ def run(arguments: Sequence[str]) -> tuple[int, str, list[str]]:
     with Ffmpeg(arguments) as child:
         output = child.stdout.read().decode("utf-8", "replace")
         status = child.wait()
-        return status, output, child.complaints()
+        return status, output, child.printed()

@@ -13,25 +13,29 @@ import numpy as np
 from ifsvideo.errors import IfsVideoError, InputError, UsageError
 from ifsvideo.types import Image, VideoInfo
 from ifsvideo.video import ffmpeg
-from ifsvideo.video.probe import Probe, probe
+from ifsvideo.video.probe import VIDEO_STREAM, Probe, probe
 from ifsvideo.video.source import FrameSource, choose_stretch
 
-_THREADS = "2"
-_DAMAGE = re.compile(r"error|invalid|corrupt|conceal|missing|truncat", re.IGNORECASE)
+_SEEK_FROM_S = 10.0
+"""Start, seconds, from which on it pays to look for a key frame instead of decoding all before."""
+_SEEK_MARGIN_S = 3.0
+"""How much earlier the key frame is looked for: files are ordered by time of decoding, ahead of showing."""
+_ORIGIN = re.compile(r"^(\[[^\]]*\] )+")  # "[h264 @ 0x5632632572c0] ", which differs from run to run
 
 
 class VideoFile(FrameSource):
     """Any file that ffmpeg decodes; its first video stream, upright, at a constant rate.
 
-    A file of constant rate yields the frames that are decoded, none repeated and none left out. A variable rate is
-    brought to the nominal constant one (ffmpeg's r_frame_rate) from time 0 on: each frame shown for its own time.
+    A file of constant rate yields the frames that are decoded, none repeated and none left out. A variable
+    rate is brought to the nominal constant one (ffmpeg's r_frame_rate) from time 0 on, each frame shown as
+    long as it was.
 
     Parameters
     ----------
     path : Path
     fps : Fraction, optional
-        Take the decoded frames one by one as if they had this rate, whatever their own times; then the sound is out of
-        step and is not offered (``info.has_audio`` is False).
+        Take the decoded frames one by one as if they had this rate, whatever their own times; then the
+        sound is out of step and is not offered (``info.has_audio`` is False).
     start, end : float
         Stretch that is read, seconds; see `choose_stretch`.
 
@@ -64,72 +68,79 @@ class VideoFile(FrameSource):
     def frames(self) -> Generator[Image, None, None]:
         """See `FrameSource.frames`."""
         first, stop = self._stretch.first, self._stretch.stop
-        decoded = 0
+        place = first if self._seeks else 0
         with ffmpeg.Ffmpeg(self._arguments()) as child:
-            while stop is None or decoded < stop:
+            while stop is None or place < stop:
                 image = self._read(child)
                 if image is None:
+                    self._check_end(child, place)
                     break
-                decoded += 1
-                if decoded > first:
+                place += 1
+                if place > first:
                     yield image
-            else:
-                child.stop()  # the rest of the file is not wanted
-            self.warnings = self._judge(child, decoded)
+            child.stop()  # where the stretch ends before the file does
+            self.warnings = self._judge(child.printed(), place - first)
+
+    @property
+    def _seeks(self) -> bool:
+        return self._timing.exact_seek and self.info.start >= _SEEK_FROM_S
 
     def _arguments(self) -> list[str]:
-        size = (
-            f"scale={self.info.width}:{self.info.height},format=rgb24"  # also if the size changes on the way
-        )
-        vary = "" if self._timing.constant else f"fps={self.info.fps}:start_time=0,"
+        # The size is forced, and the filters are not made anew, for files that change their size on the way.
+        filters = [f"scale={self.info.width}:{self.info.height}", "format=rgb24"]
+        seek = []
+        if not self._timing.constant:
+            filters.insert(0, f"fps={self.info.fps}:start_time=0")
+        elif self._seeks:
+            seek = ["-ss", f"{self.info.start - _SEEK_MARGIN_S:.6f}", "-copyts", "-start_at_zero"]
+            filters.insert(0, f"trim=start={self.info.start - 0.5 / float(self.info.fps):.6f}")
         return [
-            *("-threads", _THREADS, "-reinit_filter", "0", "-i", ffmpeg.file_url(self.path)),
-            *("-map", "0:V:0", "-vf", vary + size, "-fps_mode", "passthrough"),
-            *("-f", "rawvideo", "-"),
+            *("-loglevel", "error", "-threads", "2", "-reinit_filter", "0", *seek),
+            *("-i", ffmpeg.file_url(self.path), "-map", VIDEO_STREAM),
+            *("-vf", ",".join(filters), "-fps_mode", "passthrough", "-f", "rawvideo", "-"),
         ]
 
     def _read(self, child: ffmpeg.Ffmpeg) -> Image | None:
         image = np.empty((self.info.height, self.info.width, 3), dtype=np.uint8)
-        got = child.stdout.readinto(memoryview(image).cast("B"))  # type: ignore[attr-defined]
+        got = child.stdout.readinto(image.data.cast("B"))
         return image if got == image.nbytes else None
 
-    def _judge(self, child: ffmpeg.Ffmpeg, decoded: int) -> tuple[str, ...]:
-        """Warnings after a full pass; raises where nothing was read."""
-        first, stop = self._stretch.first, self._stretch.stop
+    def _check_end(self, child: ffmpeg.Ffmpeg, place: int) -> None:
+        """Tell an end of the file from a failure; ``place`` frames were decoded or passed over."""
         status = child.wait()
-        if stop is not None and decoded >= stop:
-            return ()
-        complaints = child.complaints()
         if status < 0:
             raise IfsVideoError(
-                f"{self.path}: ffmpeg was killed by signal {-status} while reading; run it again"
+                f"{self.path}: ffmpeg was killed while reading (signal {-status}); run it again"
             )
-        if decoded <= first:
-            if decoded:
-                length = self._timing.zero + float(decoded / self.info.fps)
-                raise UsageError(f"{self.path}: start is past the end; only {length:.2f} s can be decoded")
-            last = complaints[-1] if complaints else "no reason given"
-            raise InputError(f"{self.path}: not one frame can be decoded; copy it again (ffmpeg: {last})")
-        reason = next((line for line in complaints if _DAMAGE.search(line)), "")
-        if stop is not None:
-            return (
-                f"{self.path}: {decoded - first} of {stop - first} frames could be decoded, the file is damaged"
-                + (f" (ffmpeg: {reason})" if reason else ""),
-            )
-        return ()
+        if place > self._stretch.first:
+            return
+        if place and not self._seeks:
+            length = self._timing.zero + float(place / self.info.fps)
+            raise UsageError(f"{self.path}: start is past the end; only {length:.2f} s can be decoded")
+        reason = _ORIGIN.sub("", (child.printed() or ["no reason given"])[-1])
+        raise InputError(f"{self.path}: no frame can be decoded; copy it again (ffmpeg: {reason})")
+
+    def _judge(self, printed: list[str], frames: int) -> tuple[str, ...]:
+        """Warnings after a full pass."""
+        promised = self._stretch.frames
+        reason = f" (ffmpeg: {_ORIGIN.sub('', printed[0])})" if printed else ""
+        if promised is not None and frames < promised:
+            return (f"{self.path}: only {frames} of {promised} frames could be decoded{reason}",)
+        return (f"{self.path}: is damaged in places{reason}",) if printed else ()
 
 
 @dataclass(frozen=True)
 class _Timing:
-    """How frames get their times: rate, time of the first, number, and whether they are taken one by one."""
+    """How frames get their times: rate, time of the first, number; taken one by one or not; found or not."""
 
     fps: Fraction
     zero: float
     frames: int | None
     constant: bool
+    exact_seek: bool
 
 
 def _timing(found: Probe, fps: Fraction | None) -> _Timing:
     if fps is not None:
-        return _Timing(fps, 0.0, found.packets or None, True)
-    return _Timing(found.fps, found.first, found.frames if found.packets else None, found.constant)
+        return _Timing(fps, 0.0, found.packets or None, constant=True, exact_seek=False)
+    return _Timing(found.fps, found.first, found.frames, found.constant, found.exact_seek)

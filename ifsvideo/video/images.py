@@ -25,8 +25,9 @@ _SIDEWAYS = frozenset({5, 6, 7, 8})  # EXIF orientations that swap width and hei
 class ImageFolder(FrameSource):
     """The images of a folder, img2 before img10, all of one size.
 
-    Grey, palette and colour images are read alike, transparency is ignored, EXIF orientation applied. Images of 16 bits
-    a channel keep their upper 8, so that white stays white and every image of a folder is scaled alike.
+    Grey, palette and colour images are read alike, transparency is ignored, EXIF orientation applied.
+    Images of 16 bits a channel keep their upper 8, so that white stays white and every image of a folder is
+    scaled alike.
 
     Parameters
     ----------
@@ -97,9 +98,14 @@ def _common_size(files: list[Path]) -> tuple[int, int]:
     return size
 
 
+def _opened(file: Path) -> Any:
+    """An open image; its type in imageio knows nothing of what the Pillow plugin can do."""
+    return iio.imopen(file, "r", plugin="pillow")
+
+
 def _size(file: Path) -> tuple[int, int]:
     try:
-        with iio.imopen(file, "r", plugin="pillow") as opened:
+        with _opened(file) as opened:
             height, width = opened.properties(index=0).shape[:2]
             sideways = opened.metadata(index=0, exclude_applied=False).get("Orientation") in _SIDEWAYS
     except Exception as error:
@@ -110,7 +116,7 @@ def _size(file: Path) -> tuple[int, int]:
 def _read(file: Path) -> Image:
     """One image as (H, W, 3) uint8 RGB."""
     try:
-        with iio.imopen(file, "r", plugin="pillow") as opened:
+        with _opened(file) as opened:
             kind = opened.properties(index=0).dtype
             deep = kind.kind in "iu" and kind.itemsize > 1  # Pillow keeps only grey images at 16 bits
             pixels = opened.read(index=0, rotate=True, mode=None if deep else "RGB")

@@ -23,8 +23,8 @@ def open_source(
     fps : Fraction, optional
         Frames per second: of a folder (10 unless told), or in place of a file's own rate.
     start, end : float, optional
-        Stretch to be read, seconds of the input; an end past the end is cut to it. A frame counts from half a frame
-        before its time.
+        Stretch to be read, seconds of the input; an end past the end is cut to it. A frame counts from half a
+        frame before its time.
 
     Returns
     -------

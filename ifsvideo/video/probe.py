@@ -1,7 +1,7 @@
 """What a file holds, found by letting ffmpeg decode its first frame and list its packets.
 
-There is no ffprobe. The ``framecrc`` format tells the size, the pixel aspect and the rate exactly, after rotation; the
-text that ffmpeg prints is read only for the sound and for the reason of a failure.
+There is no ffprobe. The ``framecrc`` format tells the size, the pixel aspect and the rate exactly, after
+rotation; the text that ffmpeg prints is read only for the container, the sound and the reason of a failure.
 """
 
 from __future__ import annotations
@@ -17,11 +17,33 @@ from ifsvideo.errors import InputError
 from ifsvideo.types import Floats
 from ifsvideo.video import ffmpeg
 
-_AUDIO = re.compile(r"Stream #0:\d+(?:\[0x[0-9a-f]+\])?(?:\(\w*\))?: Audio: (\w+)")
-_VIDEO_STREAM = "0:V:0"  # capital V: not the cover picture of a song
+VIDEO_STREAM = "0:V:0"
+"""The first video stream; the capital V passes over the cover picture of a song."""
+_CONTAINER = re.compile(r"Input #0, ([\w,]+), from")
+_AUDIO = re.compile(r"Stream #0:\d+(?:\[0x[0-9a-f]+\])?(?:\(\w*\))?: Audio: (?!none)(\w+)")
 _HIGHEST_PLAIN_RATE = 240
-"""Frames per second above which a nominal rate is doubted: often it is only the resolution of the clock (1000, 90000)."""
+"""Frames per second above which a nominal rate is doubted: often it is but the clock's (1000, 90000)."""
 _DISCARD = 4  # AV_PKT_FLAG_DISCARD: decoded for reference only, as before the first frame of an edit list
+_UNKNOWN_TIME = np.iinfo(np.int64).min  # AV_NOPTS_VALUE
+
+
+@dataclass(frozen=True)
+class Packets:
+    """The video packets of a file.
+
+    Attributes
+    ----------
+    times : (N,) float64
+        Seconds from the start of the file, in order of showing.
+    exact : bool
+        Whether these are times of showing; else of decoding, as in AVI.
+    last_duration : float
+        How long the last one is shown, seconds.
+    """
+
+    times: Floats
+    exact: bool
+    last_duration: float
 
 
 @dataclass(frozen=True)
@@ -39,11 +61,14 @@ class Probe:
     constant : bool
         Whether the frames stand on the grid of ``fps``, one on each place.
     first : float
-        Time of the first frame, seconds from the start of the file (of its sound, where that begins earlier).
-    frames : int
-        Frames that the packets promise at ``fps``.
+        Time of the first frame, seconds from the start of the file (of its sound, where that begins earlier);
+        0 for a variable rate, whose first frame is shown from there on.
+    frames : int or None
+        Frames that the packets promise at ``fps``; None where they could not be listed.
     packets : int
-        Frames that the packets promise one by one.
+        Number of packets.
+    exact_seek : bool
+        Whether a frame can be found by its time without decoding all before it.
     audio_codec : str or None
         ffmpeg's name of the first sound stream's codec.
     """
@@ -54,8 +79,9 @@ class Probe:
     fps: Fraction
     constant: bool
     first: float
-    frames: int
+    frames: int | None
     packets: int
+    exact_seek: bool
     audio_codec: str | None
 
 
@@ -68,44 +94,43 @@ def probe(path: Path) -> Probe:
         If the file is missing, not readable, empty, no video, or if not one frame of it can be decoded.
     """
     _check_readable(path)
-    source = ["-i", ffmpeg.file_url(path), "-map", _VIDEO_STREAM]
-    status, listing, complaints = ffmpeg.run([*source, "-frames:v", "1", "-f", "framecrc", "-"])
+    source = ["-i", ffmpeg.file_url(path), "-map", VIDEO_STREAM]
+    _, listing, printed = ffmpeg.run([*source, "-frames:v", "1", "-f", "framecrc", "-"])
     properties = dict(re.findall(r"^#(\w+) 0: (.+)$", listing, re.MULTILINE))
-    if not re.search(r"^0,", listing, re.MULTILINE) or "dimensions" not in properties:
-        raise InputError(f"{path}: {_reason(complaints)}" + (f" (ffmpeg: {status})" if status < 0 else ""))
+    if "dimensions" not in properties or not re.search(r"^0,", listing, re.MULTILINE):
+        raise InputError(f"{path}: {_reason(printed)}")
     width, height = (int(side) for side in properties["dimensions"].split("x"))
-    times, duration = _packet_times(source)
-    fps = _plausible(1 / Fraction(properties["tb"]), times)
-    places = (times - times[:1]) * float(fps)
-    # Clocks of a millisecond or of 1/90000 s shake a constant rate by far less than a frame, and never add up.
-    constant = bool((np.abs(places - np.arange(len(places))) < 0.75).all())
-    span = float(times[-1]) + duration if len(times) else 0.0
+    packets = _list_packets(source)
+    fps = _plausible(1 / Fraction(properties["tb"]), packets.times)
+    constant = _is_constant(packets.times, fps)
+    containers = _first_match(_CONTAINER, printed) or ""
     return Probe(
         width=width,
         height=height,
         sample_aspect=_aspect(properties.get("sar", "")),
         fps=fps,
         constant=constant,
-        first=max(0.0, float(times[0])) if constant and len(times) else 0.0,
-        frames=len(times) if constant else max(1, round(span * fps)),
-        packets=len(times),
-        audio_codec=next((match[1] for line in complaints if (match := _AUDIO.match(line))), None),
+        first=max(0.0, float(packets.times[0])) if constant and len(packets.times) else 0.0,
+        frames=_promised(packets, fps, constant),
+        packets=len(packets.times),
+        exact_seek=constant and packets.exact and re.search(r"\b(mp4|matroska)\b", containers) is not None,
+        audio_codec=_first_match(_AUDIO, printed),
     )
 
 
 def count_frames(path: Path) -> int:
     """Number of video packets in a file, 0 where it cannot be read."""
-    return len(_packet_times(["-i", ffmpeg.file_url(path), "-map", _VIDEO_STREAM])[0])
+    return len(_list_packets(["-i", ffmpeg.file_url(path), "-map", VIDEO_STREAM]).times)
 
 
 def audio_codec(path: Path) -> str | None:
     """ffmpeg's name of the codec of the first sound stream, None where there is none."""
-    _, _, complaints = ffmpeg.run(["-i", ffmpeg.file_url(path)])
-    return next((match[1] for line in complaints if (match := _AUDIO.match(line))), None)
+    _, _, printed = ffmpeg.run(["-i", ffmpeg.file_url(path)])
+    return _first_match(_AUDIO, printed)
 
 
 def _check_readable(path: Path) -> None:
-    """Faults that the system tells more clearly than ffmpeg does."""
+    """Name the faults that the system tells more clearly than ffmpeg does."""
     try:
         with path.open("rb") as file:
             if not file.read(1):
@@ -115,35 +140,34 @@ def _check_readable(path: Path) -> None:
     except PermissionError:
         raise InputError(f"{path}: no permission to read it; change its mode or its owner") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the disk") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the name and the disk") from None
 
 
-def _reason(complaints: list[str]) -> str:
+def _reason(printed: list[str]) -> str:
     """Why ffmpeg gave no frame, and what to do."""
-    text = "\n".join(complaints)
+    text = "\n".join(printed)
     if "moov atom not found" in text and "low score" not in text:
         return "is cut off (its index, the moov atom, is missing); copy or download it again"
     if re.search(r"matches no streams|Failed to set value '0:V:0'", text):
         return "holds no video" + (", only sound" if "Audio:" in text else "") + "; name a video file"
     if "Invalid data found when processing input" in text and "Stream #0" not in text:
         return "is not a video that ffmpeg can read; check that it is one, or copy it again"
-    last = complaints[-1] if complaints else "no reason given"
+    last = printed[-1] if printed else "no reason given"
     return f"not one frame can be decoded; convert it or copy it again (ffmpeg: {last})"
 
 
-def _packet_times(source: list[str]) -> tuple[Floats, float]:
-    """Times of the video packets in order of showing (N,), seconds, and the length of the last; nothing is decoded."""
+def _list_packets(source: list[str]) -> Packets:
+    """The video packets of a file, read but not decoded."""
     _, listing, _ = ffmpeg.run([*source, "-c", "copy", "-f", "framecrc", "-"])
-    base = re.search(r"^#tb 0: (\d+)/(\d+)$", listing, re.MULTILINE)
+    base = re.search(r"^#tb 0: (\d+/\d+)$", listing, re.MULTILINE)
     rows = [line.split(",") for line in listing.splitlines() if line.startswith("0,")]
     rows = [row for row in rows if len(row) >= 6 and not _discarded(row)]
     if base is None or not rows:
-        return np.zeros(0), 0.0
-    tick = int(base[1]) / int(base[2])
+        return Packets(np.zeros(0), False, 0.0)
+    tick = float(Fraction(base[1]))
     decoding, showing = (np.array([int(row[column]) for row in rows], dtype=np.int64) for column in (1, 2))
-    unknown = np.iinfo(np.int64).min
-    stamps = np.sort(decoding if (showing == unknown).any() else showing)  # AVI knows no time of showing
-    return stamps * tick, int(rows[-1][3]) * tick
+    exact = bool((showing != _UNKNOWN_TIME).all())
+    return Packets(np.sort(showing if exact else decoding) * tick, exact, int(rows[-1][3]) * tick)
 
 
 def _discarded(row: list[str]) -> bool:
@@ -159,8 +183,31 @@ def _plausible(nominal: Fraction, times: Floats) -> Fraction:
     return nominal if average > 0.7 * nominal else Fraction(round(average * 1000), 1000)
 
 
+def _is_constant(times: Floats, fps: Fraction) -> bool:
+    """Whether frame k is shown at ``times[0] + k / fps``.
+
+    Clocks of a millisecond or of 1/90000 s shake the times by far less than the 3/4 of a frame allowed
+    here, while a frame that is left out, or a rate that is not quite the nominal one, moves all that follow
+    by a whole one.
+    """
+    places = (times - times[:1]) * float(fps)
+    return bool((np.abs(places - np.arange(len(places))) < 0.75).all())
+
+
+def _promised(packets: Packets, fps: Fraction, constant: bool) -> int | None:
+    if not len(packets.times):
+        return None
+    if constant:
+        return len(packets.times)
+    return max(1, round((float(packets.times[-1]) + packets.last_duration) * fps))
+
+
 def _aspect(text: str) -> Fraction:
     width, _, height = text.partition("/")
     if width.isdigit() and height.isdigit() and int(width) and int(height):
         return Fraction(int(width), int(height))
     return Fraction(1)
+
+
+def _first_match(pattern: re.Pattern[str], lines: list[str]) -> str | None:
+    return next((match[1] for line in lines if (match := pattern.match(line))), None)

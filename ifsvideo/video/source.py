@@ -32,9 +32,9 @@ class FrameSource(ABC):
 
     @abstractmethod
     def frames(self) -> Generator[Image, None, None]:
-        """Open the source anew and yield its frames, each an array of its own: (H, W, 3) uint8 RGB, C-contiguous.
+        """Open the source anew and yield its frames, each a new (H, W, 3) uint8 RGB array, C-contiguous.
 
-        Close the generator (``contextlib.closing``) to stop early. Every pass yields the same number of frames.
+        Close the generator (``contextlib.closing``) to stop early. Every pass yields as many frames.
 
         Raises
         ------
@@ -45,7 +45,7 @@ class FrameSource(ABC):
 
 @dataclass(frozen=True)
 class Stretch:
-    """Frames ``first`` to ``stop`` (exclusive; None: to the end) of a source, counted from its own first frame."""
+    """Frames ``first`` to ``stop`` (exclusive; None: to the end), counted from the source's first frame."""
 
     first: int
     stop: int | None
@@ -61,8 +61,9 @@ def choose_stretch(
 ) -> Stretch:
     """The frames shown from ``start`` to ``end``.
 
-    A frame belongs to the stretch if its time, ``zero + k / fps``, is at least ``start`` and less than ``end``, each
-    less half a frame: so a time that was rounded, up or down, still names the frame that was meant.
+    A frame belongs to the stretch if its time, ``zero + k / fps``, is at least ``start`` and less than
+    ``end``, each less half a frame: so a time that was rounded, up or down, still names the frame that was
+    meant.
 
     Parameters
     ----------
@@ -94,9 +95,7 @@ def choose_stretch(
             length = zero + float(frames / fps)
             raise UsageError(f"{path}: start {start:g} s is past the end; the video is {length:.2f} s long")
     if stop is not None and stop <= first:
-        raise UsageError(
-            f"{path}: no frame is shown from {start:g} s to {end or 0:g} s; give a longer stretch"
-        )
+        raise UsageError(f"{path}: no frame from {start:g} s to {end or 0:g} s; give a longer stretch")
     return Stretch(first, stop)
 
 

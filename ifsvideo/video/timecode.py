@@ -25,7 +25,7 @@ def parse_time(text: str) -> float:
     Raises
     ------
     UsageError
-        If the text is no such time, is negative or not a number; or if minutes or seconds after a colon reach 60.
+        If the text is no such time, is negative or not a number, or a part after a colon reaches 60.
     """
     match = _TIME.fullmatch(text.strip())
     if match is None:

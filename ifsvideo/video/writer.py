@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import cv2
 import numpy as np
 
 from ifsvideo.errors import OutputError, UsageError
@@ -60,7 +60,7 @@ def check_output(path: Path, source: Path | None = None) -> None:
 class VideoWriter:
     """Writes frames to an H.264 file: yuv420p, constant rate, faststart.
 
-    The file appears at its place when the context ends well; otherwise nothing is left and an older file stays.
+    The file appears at its place when the context ends well; otherwise nothing is left, an older file stays.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ class VideoWriter:
     info : VideoInfo
         Size, rate and pixel aspect of the frames; ``info.start`` is where in ``audio_from`` the sound begins.
     audio_from : Path, optional
-        File whose first sound stream is kept, for as long as the video is: copied where it is taken from its beginning and
-        the container holds its codec, else encoded as AAC, cut to the sample.
+        File whose first sound stream is kept, for as long as the video is: copied where it is taken from its
+        beginning and the container holds its codec, else encoded as AAC, cut to the sample.
     outputs : Outputs, optional
         Group with which the file is placed; alone by default.
 
@@ -119,7 +119,7 @@ class VideoWriter:
         self._own = Outputs()
         try:
             self._target = (self._group or self._own).add(self.path)
-            # With sound, the pictures go to a file of their own first: only when all are written is the length known.
+            # With sound, the pictures go to a file of their own first: the length is known only at the end.
             self._pictures = self._own.add_scratch(self._target) if self._audio_from else self._target
             self._child = ffmpeg.Ffmpeg(self._arguments(), feeds=True)
         except BaseException:
@@ -145,13 +145,14 @@ class VideoWriter:
         expected = (self._info.height, self._info.width, 3)
         if image.shape != expected or image.dtype != np.uint8:
             raise ValueError(f"expected uint8 image of shape {expected}, got {image.dtype} {image.shape}")
+        pixels = np.ascontiguousarray(image)
         if self.padded:
-            image = cv2.copyMakeBorder(image, 0, self._pad[0], 0, self._pad[1], cv2.BORDER_REPLICATE)
+            pixels = np.pad(image, ((0, self._pad[0]), (0, self._pad[1]), (0, 0)), mode="edge")
         try:
-            self._child.stdin.write(memoryview(np.ascontiguousarray(image)).cast("B"))
+            self._child.stdin.write(pixels.data.cast("B"))
         except OSError:
             self._child.wait()
-            raise self._failure(self._child.complaints()) from None
+            raise self._failure(self._child.printed()) from None
         self.frames += 1
 
     def __exit__(
@@ -169,25 +170,23 @@ class VideoWriter:
 
     def _finish(self) -> None:
         """Let ffmpeg end, add the sound, make sure that all is there."""
-        try:
+        with suppress(OSError):  # where ffmpeg has died, its exit status says more
             self._child.stdin.close()
-        except OSError:
-            pass  # ffmpeg has died; its exit status says more
         status = self._child.wait()
         if self.frames == 0:
             raise OutputError(f"{self.path}: no frame was written; nothing is left to place there")
         if status != 0:
-            raise self._failure(self._child.complaints())
+            raise self._failure(self._child.printed())
         if self._audio_from is not None:
             self._add_sound(self._audio_from)
         placed = count_frames(self._target)
         if placed != self.frames:  # a full disk does not always make ffmpeg fail
-            raise self._failure([*self._child.complaints(), f"{placed} of {self.frames} frames arrived"])
+            raise self._failure([*self._child.printed(), f"{placed} of {self.frames} frames arrived"])
 
     def _arguments(self) -> list[str]:
         info = self._info
         width, height = info.width + self._pad[1], info.height + self._pad[0]
-        aspect = f"setsar=sar={info.sample_aspect.numerator}/{info.sample_aspect.denominator}:max=65535"
+        aspect = f"setsar=sar={info.sample_aspect}:max=65535"
         return [
             *(
                 "-loglevel",
