@@ -330,15 +330,10 @@ def test_rows_of_a_clip() -> None:
     assert (still.found, still.false, still.idf1, still.true_objects) == (None, 0, None, 0)
 
 
-def test_a_point_beyond_the_border_takes_the_border() -> None:
-    table_outside = LabelTable(
-        np.zeros(2, np.int32),
-        np.arange(2),
-        np.array([[-0.7, 2], [7.6, 5.6]], np.float32),
-        np.array([1, 0], np.int32),
-        1,
-    )
-    assert samples.truth_of_rows(table_outside, left_half_moves(1)).tolist() == [1, 0]
+def test_a_row_takes_the_nearest_pixel_also_beyond_the_border() -> None:
+    xy = np.array([[-0.7, 2], [7.6, 5.6], [3.4, 0], [3.6, 0]], np.float32)
+    rows = LabelTable(np.zeros(4, np.int32), np.arange(4), xy, np.zeros(4, np.int32), 1)
+    assert samples.truth_of_rows(rows, left_half_moves(1)).tolist() == [1, 0, 1, 0]
 
 
 def write_sample(folder: Path, name: str, masks: np.ndarray) -> None:
@@ -447,6 +442,20 @@ def test_command_runs_the_segmenter(tmp_path: Path) -> None:
     report = json.loads((tmp_path / "a.json").read_text())
     assert len(report["sequences"][0]["estimated"]) == 2
     assert "error %" in run.stdout
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_stray_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    out = tmp_path / "scores.json"
+    out.write_text("old")
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(OutputError, match=r"scores\.json: cannot be written \(No space"):
+        command._write(out, {"dataset": "hopkins155"})
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
 
 
 def test_unwritable_json_is_refused_before_the_work(tmp_path: Path) -> None:
