@@ -31,22 +31,16 @@ import json
 import os
 import signal
 import sys
-import tomllib
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import NoReturn
 
 from ifsvideo.benchmark import datasets, samples, table
 from ifsvideo.benchmark.runner import IFSFactory, Report, run_points
 from ifsvideo.config import Config
+from ifsvideo.config_file import load_config
 from ifsvideo.errors import IfsVideoError, OutputError, UsageError
 from ifsvideo.segmentation.config import SegmenterConfig
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-Settings = TypeVar("Settings", bound="DataclassInstance")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -108,7 +102,7 @@ def _measure(options: argparse.Namespace, config: Config) -> Report:
     if options.dataset == "samples":
         if options.motions_known:
             raise UsageError(
-                "--motions-known: a pipeline finds the number itself; leave the option out for samples"
+                "--motions-known: the number changes along a clip; leave the option out for samples"
             )
         chosen = samples.clips(options.folder, options.only)
         factory = samples.PipelineFactory(config)
@@ -130,24 +124,7 @@ def _configuration(name: str) -> Config:
         return Config()
     if name == "thesis":
         return Config(segmentation=SegmenterConfig.thesis())
-    try:
-        return _filled(Config(), tomllib.loads(Path(name).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as fault:
-        raise UsageError(
-            f"{name}: not a configuration ({fault}); give a TOML file, thesis or default"
-        ) from fault
-
-
-def _filled(settings: Settings, values: dict[str, Any]) -> Settings:
-    """A settings dataclass with some fields replaced, sections by sections of their own."""
-    unknown = values.keys() - {one.name for one in fields(settings)}
-    if unknown:
-        raise ValueError(f"no setting is called {', '.join(sorted(unknown))}")
-    parts = {
-        name: _filled(getattr(settings, name), value) if is_dataclass(getattr(settings, name)) else value
-        for name, value in values.items()
-    }
-    return replace(settings, **parts)
+    return load_config(name)
 
 
 def _check_output(path: Path | None) -> None:

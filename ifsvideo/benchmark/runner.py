@@ -21,6 +21,7 @@ from ifsvideo.benchmark import metrics
 from ifsvideo.benchmark.datasets import LabelledSequence
 from ifsvideo.errors import IfsVideoError
 from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.segmenter import IFSSegmenter
 from ifsvideo.types import Segmenter
 
 Task = TypeVar("Task")
@@ -39,9 +40,6 @@ class IFSFactory:
     config: SegmenterConfig
 
     def __call__(self, seed: int) -> Segmenter:
-        # Imported by the worker that uses it, after its number of threads is set.
-        from ifsvideo.segmentation.segmenter import IFSSegmenter
-
         return IFSSegmenter(self.config, seed)
 
 

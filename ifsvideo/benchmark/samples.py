@@ -17,6 +17,7 @@ from ifsvideo.benchmark import metrics
 from ifsvideo.benchmark.runner import Report, in_processes
 from ifsvideo.config import Config
 from ifsvideo.errors import InputError, UsageError
+from ifsvideo.pipeline import Pipeline
 from ifsvideo.types import LabelTable, Result
 
 _TRUTH = "_truth.npz"
@@ -37,9 +38,6 @@ class PipelineFactory:
     config: Config
 
     def __call__(self, seed: int) -> Runnable:
-        # Imported by the worker that uses it, after its number of threads is set.
-        from ifsvideo.pipeline import Pipeline
-
         return Pipeline(replace(self.config, seed=seed))
 
 
