@@ -73,7 +73,7 @@ class OverlayConfig:
     hull_opacity: float = 0.2
     """How strongly an object's colour covers it, 0 to 1; more and the object itself is hard to see."""
     picture_brightness: float = 0.7
-    """Brightness of the picture behind the drawing, 0 to 1; the palest colour still stands out on a white sky."""
+    """Brightness of the picture behind the drawing, 0 to 1; pale colours still stand out on a white sky."""
     picture_colour: float = 0.55
     """Share of the picture's own colour that is kept, 0 to 1, so that a red car is not taken for a label."""
 
@@ -86,10 +86,59 @@ class OverlayConfig:
 
 
 @dataclass(frozen=True)
+class ObjectsConfig:
+    """Windows over a clip, and objects that keep their number (section ``[objects]``).
+
+    Lengths are pixels of a 640x480 picture and are scaled with the diagonal of the one at hand.
+    """
+
+    window_s: float = 1.0
+    """Length of a window, seconds: long enough for a car to move against its surroundings, short enough for half
+    the tracks to last."""
+    window_frames: int = 30
+    """Most frames of a window; more cost time and tell little."""
+    least_frames: int = 12
+    """Fewest frames of a window where the rate is low: at 5 a second a window is longer than a second."""
+    least_life: float = 0.5
+    """Share of a window that a track must last to be segmented; shorter ones follow their neighbours."""
+    least_shared: int = 3
+    """Tracks that two windows' labels must share to be one object."""
+    least_seconds: float = 0.5
+    """What lives shorter is no object; its points go to the background."""
+    fixed_spread: float = 0.9
+    """Radius within which a point fixed to the camera stays, pixels: KLT's jitter on a weak reflection."""
+    fixed_shake: float = 3.0
+    """How far the world's common motion must have gone meanwhile, pixels."""
+    fixed_travel: float = 10.0
+    """How far the typical point of the world must have gone meanwhile, pixels, summed over frames."""
+    fixed_world_share: float = 0.3
+    """Share of the picture's textured cells in which points must move; below it the camera stands still."""
+
+    def __post_init__(self) -> None:
+        for name in (
+            "window_s",
+            "window_frames",
+            "least_frames",
+            "least_shared",
+            "fixed_spread",
+            "fixed_shake",
+        ):
+            if not getattr(self, name) > 0:
+                raise UsageError(f"objects.{name} must be positive, got {getattr(self, name)}")
+        for name in ("least_life", "fixed_world_share"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise UsageError(f"objects.{name} must be 0 to 1, got {getattr(self, name)}")
+        for name in ("least_seconds", "fixed_travel"):
+            if not getattr(self, name) >= 0:
+                raise UsageError(f"objects.{name} must not be negative, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
 class Config:
     """All settings of a run; the fields are the sections of a TOML file."""
 
     tracking: TrackerConfig = field(default_factory=TrackerConfig)
     segmentation: SegmenterConfig = field(default_factory=SegmenterConfig)
+    objects: ObjectsConfig = field(default_factory=ObjectsConfig)
     overlay: OverlayConfig = field(default_factory=OverlayConfig)
     seed: int = 0

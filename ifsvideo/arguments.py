@@ -1,0 +1,239 @@
+"""The command line as data: options, and what they mean together."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import NoReturn, TypeVar
+
+from ifsvideo import __version__
+from ifsvideo.clip import is_tracks_file
+from ifsvideo.config import Config
+from ifsvideo.config_file import load_config
+from ifsvideo.errors import UsageError
+from ifsvideo.ignore import Area, parse_area
+from ifsvideo.video import parse_time
+
+_Value = TypeVar("_Value")
+
+_EXAMPLES = """\
+examples:
+  ifsvideo clip.mp4 -o out.mp4            the overlay, and out.csv beside it
+  ifsvideo clip.mp4 --start 10 --end 25 --ignore 0,620,1280,100
+                                          15 seconds, not looking at the bonnet
+  ifsvideo frames/ --fps 30 -o out.mp4    a folder of images, in natural order
+"""
+_STATUS = """\
+exit status: 0 done; 1 fault of the program; 2 wrong use; 3 input cannot be read; 4 output cannot be written;
+5 some of several inputs failed; 130, 143 interrupted
+"""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One input and what is written of it."""
+
+    source: Path
+    output: Path | None
+    labels: Path
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """What the command line asked for."""
+
+    jobs: tuple[Job, ...]
+    config: Config
+    fps: Fraction | None
+    start: float
+    end: float | None
+    ignore: tuple[Area, ...]
+    motions: int | None
+    quiet: bool
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message}; see ifsvideo --help")
+
+    def format_help(self) -> str:
+        return f"{_EXAMPLES}\n{super().format_help()}"
+
+
+def parse(argv: Sequence[str] | None = None) -> Arguments:
+    """Read the command line.
+
+    Raises
+    ------
+    UsageError
+        If it makes no sense. ``--help`` and ``--version`` raise SystemExit.
+    """
+    told = _parser().parse_args(argv)
+    return Arguments(
+        jobs=_jobs(told.input, told.output, told.labels),
+        config=_config(told),
+        fps=told.fps,
+        start=told.start,
+        end=told.end,
+        ignore=tuple(told.ignore),
+        motions=told.motions,
+        quiet=told.quiet,
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="ifsvideo",
+        usage="ifsvideo INPUT [INPUT ...] [-o OUTPUT] [options]",
+        description="Tells what moves by itself in a video whose camera moves too.",
+        epilog=_STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        add_help=False,
+        allow_abbrev=False,
+    )
+    _add_files(parser)
+    _add_reading(parser)
+    _add_finding(parser)
+    _add_running(parser)
+    return parser
+
+
+def _add_files(parser: argparse.ArgumentParser) -> None:
+    files = parser.add_argument_group("files")
+    files.add_argument(
+        "input", nargs="+", type=Path, metavar="INPUT", help="video, folder of images, or tracks (.npz, .mat)"
+    )
+    files.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="overlay: .mp4, .mov or .mkv (default: INPUT.ifs.mp4 beside the input)",
+    )
+    files.add_argument(
+        "--labels", type=Path, metavar="FILE", help="label of every point (default: .csv beside the overlay)"
+    )
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
+    reading = parser.add_argument_group("reading")
+    reading.add_argument(
+        "--fps",
+        type=_option(_rate),
+        metavar="N",
+        help="frames per second of a folder or of tracks (default: 10), or in place of a video's own",
+    )
+    reading.add_argument(
+        "--start",
+        type=_option(parse_time),
+        default=0.0,
+        metavar="TIME",
+        help="begin here: seconds, or 1:02.5",
+    )
+    reading.add_argument("--end", type=_option(parse_time), metavar="TIME", help="stop before this time")
+    reading.add_argument(
+        "--ignore",
+        type=_option(parse_area),
+        action="append",
+        default=[],
+        metavar="AREA",
+        help="do not look at x,y,w,h (pixels), or at what is black in a mask image; may be repeated",
+    )
+
+
+def _add_finding(parser: argparse.ArgumentParser) -> None:
+    finding = parser.add_argument_group("finding")
+    finding.add_argument(
+        "--max-points", type=_option(_whole), metavar="N", help="points tracked at once (default: 1000)"
+    )
+    finding.add_argument(
+        "--motions",
+        type=_option(_whole),
+        metavar="K",
+        help="number of motions, background included (default: found)",
+    )
+    finding.add_argument(
+        "--seed", type=_option(_natural), metavar="N", help="same seed, same labels (default: 0)"
+    )
+    finding.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings")
+
+
+def _add_running(parser: argparse.ArgumentParser) -> None:
+    running = parser.add_argument_group("running")
+    running.add_argument("--no-legend", action="store_true", help="no time, frame and number on the picture")
+    running.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    running.add_argument("--debug", action="store_true", help="show where in the program an error arose")
+    running.add_argument("--version", action="version", version=f"ifsvideo {__version__}")
+    running.add_argument("-h", "--help", action="help", help="show this")
+
+
+def _option(convert: Callable[[str], _Value]) -> Callable[[str], _Value]:
+    """A converter whose UsageError becomes argparse's message, which names the option."""
+
+    def converted(text: str) -> _Value:
+        try:
+            return convert(text)
+        except UsageError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return converted
+
+
+def _rate(text: str) -> Fraction:
+    try:
+        rate = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        rate = Fraction(0)
+    if rate <= 0:
+        raise UsageError(f"{text!r} is no rate; write a positive number (30, 29.97 or 30000/1001)")
+    return rate
+
+
+def _whole(text: str) -> int:
+    if _natural(text) < 1:
+        raise UsageError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
+def _natural(text: str) -> int:
+    if not (text.isascii() and text.isdigit()):
+        raise UsageError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+def _config(told: argparse.Namespace) -> Config:
+    """Settings of the file, and over them those of the command line."""
+    config = load_config(told.config) if told.config else Config()
+    if told.max_points is not None:
+        config = replace(config, tracking=replace(config.tracking, max_points=told.max_points))
+    if told.seed is not None:
+        config = replace(config, seed=told.seed)
+    if told.no_legend:
+        config = replace(config, overlay=replace(config.overlay, legend=False))
+    return config
+
+
+def _jobs(sources: Sequence[Path], output: Path | None, labels: Path | None) -> tuple[Job, ...]:
+    """What is written of each input."""
+    if len(sources) > 1 and (output or labels):
+        raise UsageError("-o and --labels name one file; give one input, or leave them out")
+    jobs = tuple(_job(source, output, labels) for source in sources)
+    places = [job.labels for job in jobs]
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice is not None:
+        raise UsageError(f"{twice}: two inputs would be written there; run them one by one with -o")
+    return jobs
+
+
+def _job(source: Path, output: Path | None, labels: Path | None) -> Job:
+    if output is not None and not output.name:
+        raise UsageError("-o needs the name of a file, such as out.mp4")
+    if output is None:
+        place = source if source.name else source.resolve()
+        output = place.with_name(f"{place.name if place.is_dir() else place.stem}.ifs.mp4")
+        if is_tracks_file(source):
+            return Job(source, None, labels or output.with_suffix(".csv"))
+    return Job(source, output, labels or output.with_suffix(".csv"))

@@ -1,0 +1,129 @@
+"""What a pipeline runs on: pictures, or tracks that were made elsewhere."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.errors import UsageError
+from ifsvideo.output.atomic import check_writable
+from ifsvideo.tracking.files import load_tracks
+from ifsvideo.tracking.trajectories import Trajectories
+from ifsvideo.types import Tracks, VideoInfo
+from ifsvideo.video import FrameSource, check_output, open_source
+
+TRACK_ENDINGS = (".npz", ".mat")
+DEFAULT_FPS = Fraction(10)
+
+Source = str | Path | FrameSource | Tracks | NDArray[Any]
+"""Path of a video, a folder of images or tracks; an open source of frames; tracks (F, P, 2), NaN: not seen."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Pictures (``frames``) or tracks (``trajectories``): exactly one of them is there.
+
+    Attributes
+    ----------
+    name : str, for messages.
+    info : VideoInfo
+    path : Path or None, where it was read from.
+    """
+
+    name: str
+    info: VideoInfo
+    path: Path | None
+    frames: FrameSource | None = None
+    trajectories: Trajectories | None = None
+
+
+def as_tracks(source: Tracks | NDArray[Any]) -> Tracks:
+    """Tracks as they are, or from an (F, P, 2) array: NaN, or masked, where a point is not seen."""
+    if isinstance(source, Tracks):
+        return source
+    return Tracks.from_array(np.ma.filled(np.ma.asarray(source, dtype=np.float64), np.nan))
+
+
+def is_tracks_file(path: Path) -> bool:
+    """Whether a path is taken for tracks, by its ending."""
+    return path.suffix.lower() in TRACK_ENDINGS and not path.is_dir()
+
+
+def open_clip(source: Source, fps: Fraction | None, start: float, end: float | None) -> Clip:
+    """Open what was given.
+
+    Parameters
+    ----------
+    source : path, FrameSource, Tracks or (F, P, 2) array
+    fps : Fraction or None
+        Frames per second; None: the source's own, 10 where it has none.
+    start, end : float
+        Stretch of pictures that is read, seconds; tracks are taken whole.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    UsageError
+        If the stretch makes no sense, or is asked for of something that is taken whole.
+    """
+    path = Path(source) if isinstance(source, str | Path) else None
+    if path is not None and not is_tracks_file(path):
+        frames = open_source(path, fps=fps, start=start, end=end)
+        return Clip(str(path), frames.info, path, frames=frames)
+    name = str(path) if path is not None else type(source).__name__
+    if start != 0.0 or end is not None:
+        raise UsageError(f"{name}: is taken whole; leave out start and end")
+    if isinstance(source, FrameSource):
+        if fps is not None:
+            raise UsageError(f"{name}: is open already and has its rate; leave out fps")
+        return Clip(str(source.path), source.info, source.path, frames=source)
+    tracks = load_tracks(path) if path is not None else as_tracks(source)
+    return Clip(name, _info_of(tracks, fps), path, trajectories=Trajectories.from_tracks(tracks))
+
+
+def check_outputs(clip: Clip, video: Path | None, labels: Path | None) -> None:
+    """Refuse outputs before any work is done.
+
+    Raises
+    ------
+    UsageError
+        If an output is the input or the other output, has an unknown ending, or needs pictures.
+    OutputError
+        If it cannot be written.
+    """
+    if video is not None:
+        if clip.frames is None:
+            raise UsageError(f"{clip.name}: tracks hold no pictures; write their labels only (--labels FILE)")
+        check_output(video, clip.path)
+    if labels is not None:
+        for other, what in ((clip.path, "the input itself"), (video, "the video too")):
+            if other is not None and _same(labels, other):
+                raise UsageError(f"{labels}: is {what}; name another file for the labels")
+        check_writable(labels)
+
+
+def _same(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return os.path.samefile(one, other)
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _info_of(tracks: Tracks, fps: Fraction | None) -> VideoInfo:
+    """Size and rate of tracks; where nobody told the size, the extent of the points."""
+    rate = fps or (Fraction(tracks.fps).limit_denominator(100_000) if tracks.fps else DEFAULT_FPS)
+    width, height = tracks.size or _extent(tracks.xy[tracks.visible])
+    return VideoInfo(width, height, rate, tracks.frames)
+
+
+def _extent(xy: NDArray[np.float64]) -> Sequence[int]:
+    if len(xy) == 0:
+        return 1, 1
+    return [max(1, int(side)) for side in np.ceil(xy.max(axis=0) + 1).tolist()]

@@ -1,0 +1,63 @@
+"""What a person wants to read when a run is done."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ifsvideo.output.legend import clock
+from ifsvideo.types import Result
+
+_SHOWN = 12
+"""Objects listed one by one; the CSV has all."""
+
+
+def summary(name: str, result: Result, seconds: float) -> str:
+    """The summary of a run, lines without a final line break.
+
+    Parameters
+    ----------
+    name : str
+        What was read.
+    result : Result
+    seconds : float
+        How long the run took, all in all.
+    """
+    lines = [_headline(name, result)]
+    for item in result.objects[:_SHOWN]:
+        lasting = f"{clock(item.first_s)} to {clock(item.last_s)}"
+        lines.append(f"  object {item.label:<4} {lasting}, {_count(item.tracks, 'point')}")
+    if len(result.objects) > _SHOWN:
+        lines.append(f"  and {len(result.objects) - _SHOWN} more")
+    lines.append(f"  points      {_points(result)}")
+    lines += [f"  wrote       {path}" for path in (result.output, result.labels) if path is not None]
+    lines.append(f"  speed       {_speed(result, seconds)}")
+    lines += [f"  warning     {text}" for text in result.warnings]
+    return "\n".join(lines)
+
+
+def _headline(name: str, result: Result) -> str:
+    frames = result.table.frames
+    length = f"{_count(frames, 'frame')}, {float(frames / result.info.fps):.1f} s"
+    count = len(result.objects)
+    moving = "nothing moves by itself" if not count else f"{_count(count, 'moving object')}"
+    return f"{name}: {moving} in {length}"
+
+
+def _points(result: Result) -> str:
+    """Tracks in all, and how the rows divide."""
+    table = result.table
+    if len(table.labels) == 0:
+        return "none"
+    shares = [np.mean(part) for part in (table.labels == 0, table.labels > 0, table.labels < 0)]
+    words = ("background", "moving", "undecided")
+    parts = ", ".join(f"{100 * share:.1f} % {word}" for share, word in zip(shares, words, strict=True))
+    return f"{_count(len(np.unique(table.ids)), 'track')}: {parts}"
+
+
+def _speed(result: Result, seconds: float) -> str:
+    stages = ", ".join(f"{stage} {spent:.1f} s" for stage, spent in result.seconds.items())
+    return f"{result.table.frames / max(seconds, 1e-9):.1f} frames per second ({stages})"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
