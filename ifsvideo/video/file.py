@@ -126,7 +126,9 @@ class VideoFile(FrameSource):
         reason = f" (ffmpeg: {_ORIGIN.sub('', printed[0])})" if printed else ""
         if promised is not None and frames < promised:
             return (f"{self.path}: only {frames} of {promised} frames could be decoded{reason}",)
-        return (f"{self.path}: is damaged in places{reason}",) if printed else ()
+        if not printed or self._seeks:  # a decoder that begins in the middle complains of what it missed
+            return ()
+        return (f"{self.path}: is damaged in places{reason}",)
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ _SIDEWAYS = frozenset({5, 6, 7, 8})  # EXIF orientations that swap width and hei
 class ImageFolder(FrameSource):
     """The images of a folder, img2 before img10, all of one size.
 
-    Grey, palette and colour images are read alike, transparency is ignored, EXIF orientation applied.
-    Images of 16 bits a channel keep their upper 8, so that white stays white and every image of a folder is
-    scaled alike.
+    Grey, palette and colour images are read alike, transparency is ignored, EXIF orientation applied (not
+    of PNG). Images of 16 bits a channel keep their upper 8, so that white stays white and every image of a
+    folder is scaled alike.
 
     Parameters
     ----------
@@ -103,11 +103,20 @@ def _opened(file: Path) -> Any:
     return iio.imopen(file, "r", plugin="pillow")
 
 
+def _turns(file: Path) -> bool:
+    """Whether EXIF orientation is looked for: rare in a PNG, where it may stand last and cost a decoding."""
+    return file.suffix.lower() != ".png"
+
+
 def _size(file: Path) -> tuple[int, int]:
+    """Width and height of the upright image."""
+    sideways = False
     try:
         with _opened(file) as opened:
             height, width = opened.properties(index=0).shape[:2]
-            sideways = opened.metadata(index=0, exclude_applied=False).get("Orientation") in _SIDEWAYS
+            if _turns(file):
+                tags = opened.metadata(index=0, exclude_applied=False)
+                sideways = tags.get("Orientation") in _SIDEWAYS
     except Exception as error:
         raise _unreadable(file, error) from None
     return (height, width) if sideways else (width, height)
@@ -119,7 +128,7 @@ def _read(file: Path) -> Image:
         with _opened(file) as opened:
             kind = opened.properties(index=0).dtype
             deep = kind.kind in "iu" and kind.itemsize > 1  # Pillow keeps only grey images at 16 bits
-            pixels = opened.read(index=0, rotate=True, mode=None if deep else "RGB")
+            pixels = opened.read(index=0, rotate=_turns(file), mode=None if deep else "RGB")
     except Exception as error:
         raise _unreadable(file, error) from None
     if deep:
@@ -127,7 +136,8 @@ def _read(file: Path) -> Image:
     return np.ascontiguousarray(pixels, dtype=np.uint8)
 
 
-def _unreadable(file: Path, error: Any) -> InputError:
-    """Pillow and imageio raise many kinds, from OSError to SyntaxError; the first line says the reason."""
-    reason = (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
-    return InputError(f"{file}: is not an image that can be read ({reason}); replace it or remove it")
+def _unreadable(file: Path, error: Exception) -> InputError:
+    """One message for the many kinds that imageio and Pillow raise, whose texts speak of plugins."""
+    if isinstance(error, PermissionError):
+        return InputError(f"{file}: no permission to read it; change its mode or its owner")
+    return InputError(f"{file}: is damaged or no image; replace it or remove it")

@@ -37,13 +37,16 @@ class Packets:
         Seconds from the start of the file, in order of showing.
     exact : bool
         Whether these are times of showing; else of decoding, as in AVI.
-    last_duration : float
-        How long the last one is shown, seconds.
+    end : float
+        When the last one has been shown, seconds; of a file that is cut off, what its header says.
+    cut_off : bool
+        Whether the file ends before its header says.
     """
 
     times: Floats
     exact: bool
-    last_duration: float
+    end: float
+    cut_off: bool
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,7 @@ def probe(path: Path) -> Probe:
     packets = _list_packets(source)
     fps = _plausible(1 / Fraction(properties["tb"]), packets.times)
     constant = _is_constant(packets.times, fps)
+    first = max(0.0, float(packets.times[0])) if constant and len(packets.times) else 0.0
     containers = _first_match(_CONTAINER, printed) or ""
     return Probe(
         width=width,
@@ -110,8 +114,8 @@ def probe(path: Path) -> Probe:
         sample_aspect=_aspect(properties.get("sar", "")),
         fps=fps,
         constant=constant,
-        first=max(0.0, float(packets.times[0])) if constant and len(packets.times) else 0.0,
-        frames=_promised(packets, fps, constant),
+        first=first,
+        frames=_promised(packets, fps, first, constant),
         packets=len(packets.times),
         exact_seek=constant and packets.exact and re.search(r"\b(mp4|matroska)\b", containers) is not None,
         audio_codec=_first_match(_AUDIO, printed),
@@ -158,16 +162,26 @@ def _reason(printed: list[str]) -> str:
 
 def _list_packets(source: list[str]) -> Packets:
     """The video packets of a file, read but not decoded."""
-    _, listing, _ = ffmpeg.run([*source, "-c", "copy", "-f", "framecrc", "-"])
+    _, listing, printed = ffmpeg.run([*source, "-c", "copy", "-f", "framecrc", "-"])
     base = re.search(r"^#tb 0: (\d+/\d+)$", listing, re.MULTILINE)
     rows = [line.split(",") for line in listing.splitlines() if line.startswith("0,")]
     rows = [row for row in rows if len(row) >= 6 and not _discarded(row)]
     if base is None or not rows:
-        return Packets(np.zeros(0), False, 0.0)
+        return Packets(np.zeros(0), exact=False, end=0.0, cut_off=False)
     tick = float(Fraction(base[1]))
     decoding, showing = (np.array([int(row[column]) for row in rows], dtype=np.int64) for column in (1, 2))
     exact = bool((showing != _UNKNOWN_TIME).all())
-    return Packets(np.sort(showing if exact else decoding) * tick, exact, int(rows[-1][3]) * tick)
+    times = np.sort(showing if exact else decoding) * tick
+    end = float(times[-1]) + int(rows[-1][3]) * tick
+    cut_off = any(re.search(r"partial file|ended prematurely", line) for line in printed)
+    return Packets(times, exact, max(end, _duration(printed)) if cut_off else end, cut_off)
+
+
+def _duration(printed: list[str]) -> float:
+    """What the header says, seconds; 0 where it says nothing."""
+    clock = _first_match(re.compile(r"Duration: (\d+:\d\d:\d\d\.\d+)"), printed)
+    hours, minutes, seconds = (float(part) for part in (clock or "0:0:0").split(":"))
+    return 3600 * hours + 60 * minutes + seconds
 
 
 def _discarded(row: list[str]) -> bool:
@@ -194,12 +208,13 @@ def _is_constant(times: Floats, fps: Fraction) -> bool:
     return bool((np.abs(places - np.arange(len(places))) < 0.75).all())
 
 
-def _promised(packets: Packets, fps: Fraction, constant: bool) -> int | None:
+def _promised(packets: Packets, fps: Fraction, first: float, constant: bool) -> int | None:
+    """Frames from ``first`` to the end at ``fps``."""
     if not len(packets.times):
         return None
-    if constant:
+    if constant and not packets.cut_off:
         return len(packets.times)
-    return max(1, round((float(packets.times[-1]) + packets.last_duration) * fps))
+    return max(1, round((packets.end - first) * fps))
 
 
 def _aspect(text: str) -> Fraction:
