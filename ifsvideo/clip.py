@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -86,7 +86,8 @@ def open_clip(source: Source, fps: Fraction | None, start: float, end: float | N
             raise UsageError(f"{name}: is open already and has its rate; leave out fps")
         return Clip(str(source.path), source.info, source.path, frames=source)
     tracks = load_tracks(path) if path is not None else as_tracks(source)
-    return Clip(name, _info_of(tracks, fps), path, trajectories=Trajectories.from_tracks(tracks))
+    info = _info_of(tracks, fps)
+    return Clip(name, info, path, trajectories=Trajectories.from_tracks(replace(tracks, fps=float(info.fps))))
 
 
 def check_outputs(clip: Clip, video: Path | None, labels: Path | None) -> None:

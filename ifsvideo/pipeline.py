@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ifsvideo.clip import Source, check_outputs, open_clip
 from ifsvideo.config import Config
@@ -157,7 +158,7 @@ class Pipeline:
             with log.stage("segmenting"):
                 told = log.teller("segmenting")
                 labels = label_clip(points, self.segmenter, self.config.objects, motions, told)
-        order = np.lexsort((points.ids, points.frame))
+        order = _order(points)
         return LabelTable(
             points.frame[order], points.ids[order], points.xy[order], labels[order], points.frames
         )
@@ -215,6 +216,16 @@ def _exact(fps: Fraction | float | None) -> Fraction | None:
     if not 0 < fps < float("inf"):
         raise UsageError(f"fps must be positive, got {fps}")
     return Fraction(fps).limit_denominator(100_000)
+
+
+def _order(points: Trajectories) -> NDArray[np.intp]:
+    """The rows by frame, then track."""
+    order = np.lexsort((points.ids, points.frame))
+    frame, ids = points.frame[order], points.ids[order]
+    twice = np.flatnonzero((np.diff(frame) == 0) & (np.diff(ids) == 0))
+    if len(twice):
+        raise ValueError(f"track {ids[twice[0]]} has two points in frame {frame[twice[0]]}")
+    return order
 
 
 def _remarks(table: LabelTable) -> list[str]:

@@ -17,6 +17,7 @@ from ifsvideo.types import Floats, Image
 SUBPIXEL_BITS = 4
 """Fractional bits of the coordinates given to OpenCV's drawing functions."""
 
+_FAR = 30000.0
 _NEIGHBOURS = 8
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
@@ -24,8 +25,9 @@ _MASK_DIAGONAL = 480.0
 
 
 def fixed_point(xy: Floats) -> NDArray[np.int32]:
-    """Coordinates for OpenCV's ``shift=SUBPIXEL_BITS``."""
-    return np.round(np.asarray(xy) * (1 << SUBPIXEL_BITS)).astype(np.int32)
+    """Coordinates for OpenCV's ``shift=SUBPIXEL_BITS``; what is very far off is brought nearer."""
+    near = np.clip(np.asarray(xy), -_FAR, _FAR)
+    return np.round(near * (1 << SUBPIXEL_BITS)).astype(np.int32)
 
 
 def outlines(xy: Floats, reach: float, margin: float) -> list[NDArray[np.float32]]:
