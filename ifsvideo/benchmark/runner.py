@@ -21,7 +21,6 @@ from ifsvideo.benchmark import metrics
 from ifsvideo.benchmark.datasets import LabelledSequence
 from ifsvideo.errors import IfsVideoError
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.segmenter import IFSSegmenter
 from ifsvideo.types import Segmenter
 
 Task = TypeVar("Task")
@@ -40,6 +39,9 @@ class IFSFactory:
     config: SegmenterConfig
 
     def __call__(self, seed: int) -> Segmenter:
+        # Imported here because only a worker needs it.
+        from ifsvideo.segmentation.segmenter import IFSSegmenter
+
         return IFSSegmenter(self.config, seed)
 
 

@@ -17,7 +17,6 @@ from ifsvideo.benchmark import metrics
 from ifsvideo.benchmark.runner import Report, in_processes
 from ifsvideo.config import Config
 from ifsvideo.errors import InputError, UsageError
-from ifsvideo.pipeline import Pipeline
 from ifsvideo.types import LabelTable, Result
 
 _TRUTH = "_truth.npz"
@@ -38,6 +37,9 @@ class PipelineFactory:
     config: Config
 
     def __call__(self, seed: int) -> Runnable:
+        # Imported here because only a worker needs it.
+        from ifsvideo.pipeline import Pipeline
+
         return Pipeline(replace(self.config, seed=seed))
 
 
