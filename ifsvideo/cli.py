@@ -118,7 +118,8 @@ class _Bars:
         if self._bar is None or stage != self._stage:
             self._close()
             self._stage = stage
-            self._bar = tqdm(desc=f"{stage:>10}", total=total, file=sys.stderr, dynamic_ncols=True)
+            unit = "window" if stage == "segmenting" else "frame"
+            self._bar = tqdm(desc=stage, total=total, unit=unit, file=sys.stderr, dynamic_ncols=True)
         self._bar.total = total
         self._bar.update(done - self._bar.n)
 

@@ -136,7 +136,7 @@ class Pipeline:
                 self._draw(clip.frames, table, writer, log)
             if csv is not None:
                 with log.stage("writing labels"):
-                    write_labels(outputs.add(csv), table, clip.info)
+                    write_labels(csv, table, clip.info, outputs)
         log.warnings[:0] = [*(clip.frames.warnings if clip.frames else ()), *_remarks(table)]
         objects = _objects(table, clip.info)
         return Result(clip.info, table, objects, video, csv, tuple(log.warnings), log.seconds)

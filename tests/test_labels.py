@@ -60,5 +60,5 @@ def test_blocks_join_without_a_seam(tmp_path, monkeypatch):
 
 
 def test_folder_that_is_missing(tmp_path):
-    with pytest.raises(OutputError, match="cannot be written"):
+    with pytest.raises(OutputError, match="does not exist"):
         write_labels(tmp_path / "none" / "a.csv", table([], [], [], []), INFO)

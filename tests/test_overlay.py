@@ -41,7 +41,9 @@ def test_picture_is_not_changed_and_size_and_type_are_kept():
 
 
 def test_background_is_subdued_and_an_object_is_lit():
-    out = OverlayRenderer(NO_LEGEND).draw(grey(), scene([[100, 60], [180, 60], [180, 140], [100, 140]], [1] * 4))
+    out = OverlayRenderer(NO_LEGEND).draw(
+        grey(), scene([[100, 60], [180, 60], [180, 140], [100, 140]], [1] * 4)
+    )
     assert 60 < out[10, 300].mean() < 110
     assert out[100, 140].mean() > out[10, 300].mean() + 15
 

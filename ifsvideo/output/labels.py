@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ifsvideo.output.atomic import output_error
+from ifsvideo.output.atomic import Outputs, output_error
 from ifsvideo.types import LabelTable, VideoInfo
 
 HEADER = "frame,time_s,track_id,x,y,label"
@@ -16,21 +16,32 @@ _BLOCK = 65536
 """Rows formatted at once: enough to be fast, few enough to need little memory."""
 
 
-def write_labels(path: Path, table: LabelTable, info: VideoInfo) -> None:
+def write_labels(path: Path, table: LabelTable, info: VideoInfo, outputs: Outputs | None = None) -> None:
     """Write the table: frame from 0, time in seconds of the input with 4 decimals, pixels with 2.
+
+    Parameters
+    ----------
+    path : Path
+    table : LabelTable
+    info : VideoInfo
+        Tells the time of a frame.
+    outputs : Outputs, optional
+        Group with which the file is placed; alone by default.
 
     Raises
     ------
     OutputError
         If the file cannot be written, as on a full disk.
     """
-    try:
-        with path.open("w", encoding="ascii", newline="") as file:
-            file.write(HEADER + "\n")
-            for start in range(0, len(table.frame), _BLOCK):
-                file.write("".join(_rows(table, info, slice(start, start + _BLOCK))))
-    except OSError as error:
-        raise output_error(path, error) from None
+    with Outputs() as own:
+        unfinished = (outputs or own).add(path)
+        try:
+            with unfinished.open("w", encoding="ascii", newline="") as file:
+                file.write(HEADER + "\n")
+                for start in range(0, len(table.frame), _BLOCK):
+                    file.write("".join(_rows(table, info, slice(start, start + _BLOCK))))
+        except OSError as error:
+            raise output_error(path, error) from None
 
 
 def _rows(table: LabelTable, info: VideoInfo, block: slice) -> Iterator[str]:
