@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not debug:
         warnings.simplefilter("ignore")  # NumPy's and others': meant for developers, and --quiet is quiet
     try:
-        with _signals_raise():
+        with _signals_raise(), _flushed():
             return _run(parse(argv), debug)
     except _Interrupted as interrupted:
         return interrupted.exit_status
@@ -133,6 +133,15 @@ class _Bars:
 
     def __exit__(self, *_: object) -> None:
         self._close()
+
+
+@contextmanager
+def _flushed() -> Iterator[None]:
+    """Let a broken pipe show here and not at Python's exit, where it cannot be caught."""
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
 
 
 @contextmanager

@@ -286,6 +286,7 @@ def test_a_signal_ends_every_stage_cleanly(clip, tmp_path, stage, number):
             assert len(snapshot(tmp_path)) > len(before), "the video is being written under another name"
             assert any("ffmpeg" in line for line in children_naming(str(tmp_path)))
         process.send_signal(number)
+        process.send_signal(number)  # impatient: cleaning up goes on
         _, err = process.communicate(timeout=30)
     assert process.returncode == 128 + number
     assert "Traceback" not in err

@@ -38,7 +38,10 @@ def test_what_is_named_is_set_and_the_rest_kept(load):
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("[tracking]\nmax_point = 3", "unknown name tracking.max_point; did you mean tracking.max_points?"),
+        (
+            "[tracking]\nbirth_intervall = 3",
+            "unknown name tracking.birth_intervall; did you mean tracking.birth_interval?",
+        ),
         ("[trakcing]\nmax_points = 3", "unknown name trakcing; did you mean tracking?"),
         ("zzz = 1", "unknown name zzz; known are tracking, segmentation, objects, overlay, seed"),
         ("[tracking]\nmax_points = 2.5", "tracking.max_points must be a whole number, got 2.5"),

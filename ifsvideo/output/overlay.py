@@ -52,7 +52,7 @@ class _Sizes:
             small_trail=max(1, round(0.0007 * diagonal)),
             outline=max(1, round(0.0014 * diagonal)),
             margin=max(4.0, 0.014 * diagonal),
-            reach=0.06 * diagonal,
+            reach=0.045 * diagonal,
             capital=max(8, round(0.011 * diagonal)),
         )
 

@@ -19,8 +19,8 @@ _OKABE_ITO: tuple[Colour, ...] = (
 # Every further round of the seven is mixed with white, then with black: (share, towards).
 _ROUNDS: tuple[tuple[float, int], ...] = ((0.0, 0), (0.5, 255), (0.4, 0), (0.75, 255))
 
-BACKGROUND_COLOUR: Colour = (206, 210, 214)
-BACKGROUND_TRAIL: Colour = (150, 154, 158)
+BACKGROUND_COLOUR: Colour = (188, 193, 198)
+BACKGROUND_TRAIL: Colour = (142, 146, 150)
 UNDECIDED_COLOUR: Colour = (118, 120, 124)
 
 
