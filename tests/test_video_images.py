@@ -103,7 +103,7 @@ def test_colour_images_of_every_kind(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("bits", [8, 16])
 def test_grey_images_become_three_equal_channels(tmp_path: Path, name: str, bits: int) -> None:
     grey = np.ascontiguousarray(picture()[..., 0])
-    (as_png if bits == 8 else deep)(tmp_path, name, grey)
+    (plain if bits == 8 else deep)(tmp_path, name, grey)
     (image,) = open_source(tmp_path).frames()
     assert (image == grey[..., None]).all()
 
