@@ -8,7 +8,7 @@ import pytest
 
 from ifsvideo.config import OverlayConfig
 from ifsvideo.output import hull
-from ifsvideo.output.legend import clock, draw_legend
+from ifsvideo.output.legend import clock, draw_legend, draw_number
 from ifsvideo.output.overlay import OverlayRenderer
 from ifsvideo.output.palette import BACKGROUND_COLOUR, ink_on, label_colour, object_colour
 from ifsvideo.output.scenes import Scenes
@@ -52,7 +52,7 @@ def test_every_point_wears_the_colour_of_its_label():
     xy = [[40, 40], [150, 90], [250, 130]]
     out = OverlayRenderer(NO_LEGEND).draw(grey(1280, 720), scene(np.array(xy) * 4, [0, 1, 2]))
     for (x, y), label in zip(xy, (0, 1, 2), strict=True):
-        assert near(out, 4 * x, 4 * y, label_colour(label))
+        assert near(out, 4 * x, 4 * y, label_colour(label), 40 if label else 70)
 
 
 def test_subpixel_position_is_kept():
@@ -198,3 +198,16 @@ def test_scenes_follow_a_track_back_in_time():
     np.testing.assert_array_equal(found.trails, expected)
     assert np.isnan(scenes.at(0).trails[:2]).all()
     assert scenes.at(3).trails.shape == (3, 0, 2)
+
+
+def test_numbers_keep_clear_of_the_legend_and_of_each_other():
+    corner = [[20, 20], [40, 20], [30, 30]]
+    one = OverlayRenderer().draw(grey(640, 360), scene(corner, [1] * 3))
+    none = OverlayRenderer().draw(grey(640, 360), scene(corner, [0] * 3))
+    # The legend tells "1 object" and "0 objects", and else stays what it was: no plate lies over its time.
+    time = np.s_[10:20, 10:50]
+    assert np.abs(one[time].astype(int) - none[time]).max() < 60
+    boxes = []
+    for number in (1, 2, 3):
+        boxes.append(draw_number(grey(640, 360), number, (100.0, 100.0), (0, 90, 200), 9, boxes))
+    assert len({box[1] for box in boxes}) == 3

@@ -31,7 +31,7 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{tail}" if hours else f"{minutes}:{tail}"
 
 
-def draw_legend(canvas: Image, time_s: float, frame: int, objects: int, capital: int) -> None:
+def draw_legend(canvas: Image, time_s: float, frame: int, objects: int, capital: int) -> list[Box]:
     """Write time, frame and number of objects into the top left corner; shorter where the picture is narrow.
 
     Parameters
@@ -39,6 +39,11 @@ def draw_legend(canvas: Image, time_s: float, frame: int, objects: int, capital:
     canvas : (H, W, 3) uint8, drawn on
     capital : int
         Height of a capital letter, pixels.
+
+    Returns
+    -------
+    list of Box
+        The place it took; none where there is no room at all.
     """
     noun = "object" if objects == 1 else "objects"
     versions = (
@@ -56,7 +61,8 @@ def draw_legend(canvas: Image, time_s: float, frame: int, objects: int, capital:
         if box[2] <= width - edge and box[3] <= height // 2:
             _panel(canvas, box, _PANEL, _PANEL_OPACITY)
             _write(canvas, text, (edge + pad, edge + pad + capital), capital, _INK, _FONT)
-            return
+            return [box]
+    return []
 
 
 def draw_number(

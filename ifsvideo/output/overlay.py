@@ -22,6 +22,7 @@ from ifsvideo.output.trails import TrailStyle, draw_trails
 from ifsvideo.types import BACKGROUND, Image, Scene
 
 _LUMA = np.array([0.299, 0.587, 0.114])
+_DISCREET = 0.75
 _RIM: Colour = (16, 18, 20)
 _ANGLES = (np.arange(12) + 0.5) * (np.pi / 6.0)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
@@ -93,14 +94,24 @@ class OverlayRenderer:
         styles += [TrailStyle(item.points, object_colour(item.label), sizes.trail) for item in objects]
         draw_trails(canvas, scene.trails, styles)
         undecided = shown & (scene.labels < BACKGROUND)
-        _dots(canvas, scene.xy[undecided], sizes.small_dot, UNDECIDED_COLOUR)
-        _dots(canvas, scene.xy[still], sizes.small_dot, BACKGROUND_COLOUR)
-        taken: list[Box] = []
+        _dots(canvas, scene.xy[undecided], sizes.small_dot, UNDECIDED_COLOUR, _DISCREET)
+        _dots(canvas, scene.xy[still], sizes.small_dot, BACKGROUND_COLOUR, _DISCREET)
         for item in objects:
-            taken.append(_draw_object(canvas, scene, item, sizes, taken))
-        if self.config.legend:
-            draw_legend(canvas, scene.time_s, scene.frame, len(objects), sizes.capital)
+            _draw_object(canvas, scene, item, sizes)
+        self._write(canvas, scene, objects, sizes)
         return canvas
+
+    def _write(self, canvas: Image, scene: Scene, objects: list[_Object], sizes: _Sizes) -> None:
+        """Legend and numbers, above all that is drawn."""
+        taken: list[Box] = []
+        if self.config.legend:
+            taken += draw_legend(canvas, scene.time_s, scene.frame, len(objects), sizes.capital)
+        for item in objects:
+            largest = item.polygons[0]
+            middle = float(largest[:, 0].min() + largest[:, 0].max()) / 2
+            anchor = (middle, float(largest[:, 1].min()) - sizes.outline)
+            colour = object_colour(item.label)
+            taken.append(draw_number(canvas, item.label, anchor, colour, sizes.capital, taken))
 
     def _subdued(self, image: Image) -> Image:
         """The picture darker and paler, so that the colours stand out."""
@@ -126,20 +137,23 @@ def _objects(scene: Scene, shown: NDArray[np.bool_], sizes: _Sizes) -> list[_Obj
     return sorted(found, key=lambda item: -item.extent)
 
 
-def _draw_object(canvas: Image, scene: Scene, item: _Object, sizes: _Sizes, taken: list[Box]) -> Box:
-    """Outline, dots and number of one object; the place that the number took."""
+def _draw_object(canvas: Image, scene: Scene, item: _Object, sizes: _Sizes) -> None:
+    """Outline and dots of one object."""
     colour = object_colour(item.label)
     edges = [hull.fixed_point(polygon) for polygon in item.polygons]
     cv2.polylines(canvas, edges, True, colour, sizes.outline, cv2.LINE_AA, hull.SUBPIXEL_BITS)
     _dots(canvas, scene.xy[item.points], sizes.dot + sizes.rim, _RIM)
     _dots(canvas, scene.xy[item.points], sizes.dot, colour)
-    largest = item.polygons[0]
-    middle = float(largest[:, 0].min() + largest[:, 0].max()) / 2
-    anchor = (middle, float(largest[:, 1].min()) - sizes.outline)
-    return draw_number(canvas, item.label, anchor, colour, sizes.capital, taken)
 
 
-def _dots(canvas: Image, xy: NDArray[np.float32], radius: float, colour: Colour) -> None:
+def _dots(
+    canvas: Image, xy: NDArray[np.float32], radius: float, colour: Colour, opacity: float = 1.0
+) -> None:
+    """Draw a dot at each point, which must be on the picture."""
+    column, row = np.round(xy).astype(np.intp).T
+    below = canvas[np.clip(row, 0, canvas.shape[0] - 1), np.clip(column, 0, canvas.shape[1] - 1)]
+    mixed = (opacity * np.array(colour) + (1.0 - opacity) * below).tolist()
     # Polygons, since OpenCV draws a small circle as a diamond.
-    for corners in hull.fixed_point(xy[:, None, :] + radius * _CIRCLE):
-        cv2.fillConvexPoly(canvas, corners, colour, cv2.LINE_AA, hull.SUBPIXEL_BITS)
+    outlines = hull.fixed_point(xy[:, None, :] + radius * _CIRCLE)
+    for corners, ink in zip(outlines, mixed, strict=True):
+        cv2.fillConvexPoly(canvas, corners, ink, cv2.LINE_AA, hull.SUBPIXEL_BITS)
