@@ -85,7 +85,7 @@ def draw_number(
     left = int(np.clip(round(anchor[0] - size[0] / 2), 0, max(0, width - size[0])))
     wanted = round(anchor[1]) - size[1]
     box = (left, 0, left + size[0], size[1])
-    for step in (0, -1, 1, -2, 2):
+    for step in (0, -1, 1, -2, 2, 3, 4):
         top = int(np.clip(wanted + step * (size[1] + 1), 0, max(0, height - size[1])))
         box = (left, top, left + size[0], top + size[1])
         if not any(_overlap(box, other) for other in taken):
