@@ -185,13 +185,19 @@ def test_a_rate_that_is_told_takes_the_frames_one_by_one(make: Make) -> None:
     assert len(numbers_of(source)) == 54
 
 
-def test_a_change_of_size_on_the_way_does_not_break_the_frames(make: Make, tmp_path: Path) -> None:
-    parts = [make(f"{w}.ts", "-c:v", "libx264", frames=10, size=(w, h)) for w, h in ((80, 48), (160, 96))]
+@pytest.mark.parametrize(
+    ("select", "expected"), [("1", [*range(10)]), ("not(eq(n,5))", [0, 1, 2, 3, 4, 4, 6, 7, 8, 9])]
+)
+def test_a_change_of_size_on_the_way_does_not_break_the_frames(
+    make: Make, tmp_path: Path, select: str, expected: list[int]
+) -> None:
+    codec = ("-c:v", "libx264", "-bf", "0", "-vf", f"select='{select}'", "-fps_mode", "passthrough")
+    parts = [make(f"{w}.ts", *codec, frames=10, size=(w, h)) for w, h in ((80, 48), (160, 96))]
     path = tmp_path / "both.ts"
     path.write_bytes(b"".join(part.read_bytes() for part in parts))
     source = open_source(path)
     assert (source.info.width, source.info.height) == (80, 48)
-    assert numbers_of(source)[-10:] == list(range(10))
+    assert numbers_of(source) == [*expected, *expected]
 
 
 @pytest.mark.parametrize(
