@@ -158,6 +158,9 @@ def _signals_raise() -> Iterator[None]:
     before = {each: signal.signal(each, interrupt) for each in numbers}
     try:
         yield
+    except _Interrupted:
+        before.clear()  # the process is about to end: further signals stay ignored until it has
+        raise
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)

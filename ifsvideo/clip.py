@@ -23,7 +23,7 @@ TRACK_ENDINGS = (".npz", ".mat")
 DEFAULT_FPS = Fraction(10)
 
 Source = str | Path | FrameSource | Tracks | NDArray[Any]
-"""Path of a video, a folder of images or tracks; an open source of frames; tracks (F, P, 2), NaN: not seen."""
+"""Path of a video, folder of images or tracks; an open source of frames; tracks (F, P, 2), NaN: not seen."""
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def broken_tracks(folder: Path) -> Path:
         (empty_file, "is empty"),
         (audio_only, "holds no video"),
         (truncated_download, "cut off"),
-        (broken_tracks, ""),
+        (broken_tracks, "is damaged"),
     ],
 )
 def test_input_that_cannot_be_read_is_3(tmp_path, capsys, make, complaint):
@@ -167,12 +167,12 @@ def unprivileged(folder: Path) -> Iterator[None]:
 
 
 @pytest.fixture
-def open_folder(clip, monkeypatch) -> Iterator[Path]:
+def open_folder(clip, clips, monkeypatch) -> Iterator[Path]:
     """A folder that anybody may enter, with a clip in it, and an ffmpeg that anybody may run."""
     with tempfile.TemporaryDirectory() as name, tempfile.TemporaryDirectory() as tools:
         os.chmod(tools, 0o755)
         monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", shutil.copy(FFMPEG, tools))
-        cli.main([str(clip), "--quiet"])  # all modules are loaded before their files are out of reach
+        cli.main([str(clips["two"]), "--quiet"])  # all modules are loaded before their files are out of reach
         yield Path(shutil.copy(clip, name)).parent
 
 
@@ -200,10 +200,10 @@ def test_permissions(open_folder, capsys, closed, status, complaint):
 
 @pytest.fixture
 def tiny_disk(tmp_path) -> Iterator[Path]:
-    """A file system of 40 kB with an older output on it."""
+    """A file system of 12 kB with an older output on it."""
     place = tmp_path / "disk"
     place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=40k", "tmpfs", str(place)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=12k", "tmpfs", str(place)]
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True, check=False).returncode:
         pytest.skip("a file system cannot be mounted here")
     try:
@@ -213,14 +213,14 @@ def tiny_disk(tmp_path) -> Iterator[Path]:
 
 
 @pytest.mark.parametrize("full", ["out.mp4", "out.csv"])
-def test_a_full_disk_is_4(tmp_path, tiny_disk, capsys, full):
-    clip = encode(tmp_path / "clip.mp4", pictures(60), "-qp", "4")
+def test_a_full_disk_is_4(clip, tmp_path, tiny_disk, capsys, full):
     for folder in (tiny_disk, tmp_path):
         for name in ("out.mp4", "out.csv"):
             (folder / name).write_bytes(OLD)
     before = snapshot(tmp_path)
     places = {name: (tiny_disk if name == full else tmp_path) / name for name in ("out.mp4", "out.csv")}
-    status, line = run(capsys, clip, "-o", places["out.mp4"], "--labels", places["out.csv"])
+    few = ("--max-points", "60", "--end", "0.6")
+    status, line = run(capsys, clip, "-o", places["out.mp4"], "--labels", places["out.csv"], *few)
     assert status == 4
     assert full in line
     assert "free space" in line
@@ -232,7 +232,7 @@ def test_a_limit_on_file_size_is_4(clip, tmp_path):
     (tmp_path / "out.mp4").write_bytes(OLD)
     before = snapshot(tmp_path)
     done = subprocess.run(
-        [sys.executable, "-m", "ifsvideo", "clip.mp4", "-o", "out.mp4", "--quiet"],
+        [sys.executable, "-m", "ifsvideo", "clip.mp4", "--end", "0.4", "-o", "out.mp4", "--quiet"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -275,7 +275,7 @@ def test_a_signal_ends_every_stage_cleanly(clip, tmp_path, stage, number):
     for name in ("out.mp4", "out.csv"):
         (tmp_path / name).write_bytes(OLD)
     before = snapshot(tmp_path)
-    arguments = [stage, str(clip), "-o", str(tmp_path / "out.mp4"), "--max-points", "60"]
+    arguments = [stage, str(clip), "-o", str(tmp_path / "out.mp4"), "--max-points", "60", "--end", "0.6"]
     process = subprocess.Popen(
         [sys.executable, "-c", HELD, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

@@ -16,7 +16,7 @@ from ifsvideo.errors import IfsVideoError, InputError, OutputError, UsageError
 
 from .conftest import FPS, HEIGHT, WIDTH, decoded, pictures
 
-QUICK = ("--max-points", "120")
+QUICK = ("--max-points", "80")
 
 
 def files(folder) -> list[str]:
@@ -225,7 +225,7 @@ def test_a_fault_is_1_and_shows_its_place_only_with_debug(monkeypatch, capsys):
 
 def test_a_reader_of_the_summary_that_leaves_is_no_fault(clip, tmp_path, monkeypatch):
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # buffered, what is left over fails at exit
-    for arguments in (f"{clip} --max-points 50", "--help"):
+    for arguments in (f"{clip} --max-points 50 --end 0.5", "--help"):
         line = f"{sys.executable} -m ifsvideo {arguments} | true; exit ${{PIPESTATUS[0]}}"
         done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
         assert done.returncode == 0
