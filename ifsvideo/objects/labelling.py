@@ -1,0 +1,70 @@
+"""From the trajectories of a clip to a label for every observation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.config import ObjectsConfig
+from ifsvideo.objects.camera_fixed import camera_fixed_tracks
+from ifsvideo.objects.linking import Linker
+from ifsvideo.objects.windows import follow_neighbours, window_bounds
+from ifsvideo.tracking.trajectories import Trajectories
+from ifsvideo.types import BACKGROUND, UNDECIDED, Segmenter
+
+
+def label_clip(
+    trajectories: Trajectories,
+    segmenter: Segmenter,
+    config: ObjectsConfig,
+    motions: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> NDArray[np.int32]:
+    """Label of every row of the trajectories.
+
+    Windows are segmented one after another, their labels linked, and each observation takes the label that
+    its track has in the window whose centre is nearest in time.
+    """
+    bounds = window_bounds(trajectories.frames, trajectories.fps, config)
+    fixed = camera_fixed_tracks(trajectories, config)
+    linker = Linker(config.least_shared)
+    labels = np.full(len(trajectories.ids), UNDECIDED, dtype=np.int32)
+    unit = float(np.hypot(*trajectories.size)) / 800 if trajectories.size else 1.0
+    halves = [(a[1] + b[0]) // 2 for a, b in pairwise(bounds)]
+    edges = [0, *halves, trajectories.frames]
+    for k, (start, stop) in enumerate(bounds):
+        tracks = trajectories.window(start, stop)
+        tracks = tracks.select(~np.isin(tracks.ids, fixed))
+        found = np.full(tracks.points, UNDECIDED, dtype=np.int64)
+        lasting = np.flatnonzero(tracks.visible.sum(axis=0) >= max(2, config.least_life * (stop - start)))
+        if len(lasting):
+            segmentation = segmenter.segment(tracks.select(lasting), motions)
+            found = follow_neighbours(tracks, lasting, segmentation.labels, unit)
+        found = linker.link(tracks.ids, found)
+        first, last = np.searchsorted(trajectories.frame, [edges[k], edges[k + 1]])
+        ids = trajectories.ids[first:last]
+        known = np.isin(ids, tracks.ids)
+        labels[first:last][known] = found[np.searchsorted(tracks.ids, ids[known])]
+        if progress:
+            progress(k + 1, len(bounds))
+    return _settle(trajectories, labels, config)
+
+
+def _settle(
+    trajectories: Trajectories, labels: NDArray[np.int32], config: ObjectsConfig
+) -> NDArray[np.int32]:
+    """Send what lives too short to the background, and number the objects in the order in which they
+    appear."""
+    fps = trajectories.fps or 30.0
+    numbers = []
+    for number in np.unique(labels[labels > BACKGROUND]):
+        frames = trajectories.frame[labels == number]
+        if (int(frames.max()) - int(frames.min()) + 1) / fps >= config.least_seconds:
+            numbers.append((int(frames.min()), int(number)))
+    final = {number: k + 1 for k, (_, number) in enumerate(sorted(numbers))}
+    table = np.arange(-1, int(labels.max(initial=0)) + 1)
+    table[2:] = [final.get(int(number), BACKGROUND) for number in table[2:]]
+    return table[labels + 1].astype(np.int32)

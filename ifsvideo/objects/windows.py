@@ -1,0 +1,90 @@
+"""A clip in windows: which frames, which tracks, and what to say of the tracks that are too short for a
+window."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ifsvideo.config import ObjectsConfig
+from ifsvideo.types import UNDECIDED, Tracks
+
+_NEIGHBOURS = 8
+"""Neighbours that are asked for the label of a short track."""
+
+
+def window_bounds(frames: int, fps: float | None, config: ObjectsConfig) -> list[tuple[int, int]]:
+    """First and one past the last frame of each window; each overlaps half of the next, the last ends with
+    the clip."""
+    length = config.window_frames
+    if fps is not None:
+        length = min(length, max(config.least_frames, round(config.window_s * fps)))
+    if frames <= length:
+        return [(0, frames)] if frames else []
+    starts = list(range(0, frames - length, max(length // 2, 1)))
+    return [(start, start + length) for start in [*starts, frames - length]]
+
+
+def follow_neighbours(
+    tracks: Tracks, decided: NDArray[np.int64], labels: NDArray[np.int64], unit: float
+) -> NDArray[np.int64]:
+    """Labels of all tracks of a window, the short ones by the neighbours they move with.
+
+    Parameters
+    ----------
+    decided : (D,) int
+        Indices of the tracks that were segmented, ``labels`` (D,) their labels.
+    unit : float
+        Pixels per pixel of a 640x480 picture.
+
+    Returns
+    -------
+    (P,) int
+        -1 where no neighbour moves alike, or where the track is seen in a single frame.
+    """
+    result = np.full(tracks.points, UNDECIDED, dtype=np.int64)
+    result[decided] = labels
+    short = np.setdiff1d(np.arange(tracks.points), decided)
+    usable = decided[labels != UNDECIDED]
+    if not len(usable):
+        return result
+    for p in short:
+        seen = np.flatnonzero(tracks.visible[:, p])
+        if len(seen) < 2:
+            continue
+        result[p] = _vote(tracks, int(p), seen, usable, result, unit)
+    return result
+
+
+def _vote(
+    tracks: Tracks,
+    p: int,
+    seen: NDArray[np.int64],
+    usable: NDArray[np.int64],
+    labels: NDArray[np.int64],
+    unit: float,
+) -> int:
+    """Label of one short track: each near neighbour votes, the more the nearer and the more alike it
+    moves."""
+    middle = seen[len(seen) // 2]
+    there = usable[tracks.visible[middle, usable]]
+    if not len(there):
+        return UNDECIDED
+    distance, index = cKDTree(tracks.xy[middle, there]).query(
+        tracks.xy[middle, p], k=min(_NEIGHBOURS, len(there))
+    )
+    near = there[np.atleast_1d(index)]
+    both = tracks.visible[seen][:, near]
+    offset = np.where(both[:, :, None], tracks.xy[seen][:, near] - tracks.xy[seen, p][:, None], np.nan)
+    # Spread of the offset between the two: rigid neighbours keep it.
+    with np.errstate(invalid="ignore"):
+        slip = np.linalg.norm(np.nanmax(offset, axis=0) - np.nanmin(offset, axis=0), axis=1)
+    slip = np.nan_to_num(slip / unit, nan=1e3)
+    reach = np.atleast_1d(distance) / unit
+    weight = np.exp(-slip / 2) / (10 + reach) * (both.sum(axis=0) >= 2)
+    if weight.sum() <= 1e-6:
+        return UNDECIDED
+    candidates = np.unique(labels[near])
+    support = [weight[labels[near] == c].sum() for c in candidates]
+    return int(candidates[int(np.argmax(support))])

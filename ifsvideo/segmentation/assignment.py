@@ -1,0 +1,81 @@
+"""Stage 3: residuals of every point to every model, and the points that no model holds (thesis 3.0.3, eq.
+3.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.segmentation.lowrank import along_mean_path
+from ifsvideo.segmentation.sampling import AffineModels
+from ifsvideo.types import Bools, Tracks
+
+
+def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np.float64]:
+    """Distance of each trajectory to each model's subspace, ``r = |U U^T w - w|`` (thesis eq. 3.3).
+
+    U holds the first two left singular vectors of the model's inlier trajectories. Where a point is not seen
+    in every frame, the projection is the least-squares one on the frames in which it is seen; for complete
+    tracks that is the equation to the letter.
+
+    Parameters
+    ----------
+    centred : bool
+        Take the inliers' mean trajectory off first; two vectors are then exactly a 2-D affine motion.
+
+    Returns
+    -------
+    (M, P) float
+        Root of the mean square distance per frame, pixels; infinite for a point seen in fewer than 3 frames,
+        which any model of rank 2 explains.
+    """
+    seen = np.repeat(tracks.visible, 2, axis=0).astype(np.float64)  # (2F, P)
+    # Offset by the mean of all keeps squares small, so that their differences stay exact.
+    offset = np.nanmean(tracks.xy, axis=(0, 1)) if centred else np.zeros(2)
+    W = np.nan_to_num((tracks.xy - offset).transpose(0, 2, 1).reshape(2 * tracks.frames, tracks.points))
+    frames = tracks.visible.sum(axis=0)
+    result = np.empty((len(models), tracks.points))
+    for m, inlier in enumerate(models.inliers):
+        mean, U = _subspace(W[:, inlier], seen[:, inlier], centred)
+        D = (W - mean[:, None]) * seen
+        # Normal equations of the projection on the visible rows, a 2x2 system for every point.
+        uu = np.einsum("ra,rb,rp->pab", U, U, seen) + 1e-9 * np.eye(2)
+        ud = U.T @ D
+        a = np.linalg.solve(uu, ud.T[:, :, None])[:, :, 0]
+        square = (D**2).sum(axis=0) - (a * ud.T).sum(axis=1)
+        result[m] = np.sqrt(np.maximum(square, 0.0) / np.maximum(frames, 1))
+    result[:, frames < 3] = np.inf
+    return result
+
+
+def _subspace(
+    W: NDArray[np.float64], seen: NDArray[np.float64], centred: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean trajectory (2F,) and two left singular vectors (2F, 2); missing entries filled along the mean."""
+    W = along_mean_path(W, seen)
+    mean = W.mean(axis=1) if centred else np.zeros(len(W))
+    U = np.linalg.svd(W - mean[:, None], full_matrices=False)[0][:, :2]
+    if U.shape[1] < 2:
+        U = np.hstack([U, np.zeros((len(W), 2 - U.shape[1]))])
+    return mean, U
+
+
+def assign(
+    tracks: Tracks, models: AffineModels, residual: NDArray[np.float64], base: int, nearest: int
+) -> NDArray[np.int64]:
+    """First label of every point: of the ``nearest`` models of least residual, the one whose controls are
+    nearest.
+
+    A point that models hold already chooses among these alone.
+
+    Returns
+    -------
+    (P,) int
+        Index of the model.
+    """
+    anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
+    distance = np.linalg.norm(anchor[None, :, None] - models.controls[:, None], axis=3).min(axis=2)  # (M, P)
+    cost = np.where(models.inliers | ~models.inliers.any(axis=0), residual, np.inf)
+    rank = np.argsort(np.argsort(cost, axis=0, kind="stable"), axis=0)
+    allowed: Bools = (rank < nearest) & (np.isfinite(cost) | ~np.isfinite(cost).any(axis=0))
+    return np.asarray(np.argmin(np.where(allowed, distance, np.inf), axis=0), dtype=np.int64)

@@ -1,0 +1,270 @@
+"""Robust bundle adjustment of a short window: camera poses, points by inverse depth, focal length and lens.
+
+A point is its bearing (a, b) in the reference frame and its inverse depth rho >= 0; camera k sees it along
+``q = R_k (a, b, 1) + rho t_k``, projected as ``u = f xy (1 + k1 |xy|^2)`` with ``xy = (q_x, q_y) / q_z``
+(inverse depth: Civera, Davison and Montiel, T-RO 2008; Schur complement: Triggs et al., Bundle Adjustment,
+2000). Inverse depth holds far points and a camera that only turns without a special case. Movers do not fit;
+a point's whole track is weighed by how well it does (Geman-McClure).
+
+Picture coordinates here are normalised: origin in the centre, unit the longer side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.types import Bools
+
+Array = NDArray[np.float64]
+
+_NEAREST = 0.05
+"""Least depth q_z relative to that in the reference frame; keeps a diverging step finite."""
+_GLOBALS = 2
+"""Shared unknowns: logarithm of the focal length, radial distortion."""
+
+
+def skew(v: Array) -> Array:
+    """Cross-product matrices (..., 3, 3) of vectors (..., 3)."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    o = np.zeros_like(x)
+    return np.stack([np.stack([o, -z, y], -1), np.stack([z, o, -x], -1), np.stack([-y, x, o], -1)], -2)
+
+
+def rotation(omega: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), Rodrigues' formula."""
+    angle = np.maximum(np.linalg.norm(omega, axis=-1), 1e-12)[..., None, None]
+    cross = skew(omega)
+    return np.asarray(
+        np.eye(3) + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * (cross @ cross)
+    )
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Cameras R (K, 3, 3), t (K, 3); points X (P, 3) as (a, b, rho); log_focal, k1 of all cameras."""
+
+    R: Array
+    t: Array
+    X: Array
+    log_focal: float
+    k1: float
+
+    @property
+    def lens(self) -> Array:
+        """The shared unknowns as a vector."""
+        return np.array([self.log_focal, self.k1])
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Intermediate values of a projection, kept for its derivatives."""
+
+    turned: Array
+    depth: Array
+    xy: Array
+    u: Array
+
+
+class Bundle:
+    """The observations of one window.
+
+    Parameters
+    ----------
+    observed : (K, P, 2) float, normalised
+    seen : (K, P) bool
+    weight : (P,) float
+        Importance of each point.
+    tolerance : (P,) float, normalised
+        Error that a static point is granted; residuals count in units of it.
+    reference : int
+        The camera that defines bearings and depth: R = I, t = 0.
+    lens_prior, lens_spread : (2,) float
+        Expected log focal length and k1, and how far they may be off (standard deviation).
+    """
+
+    def __init__(
+        self,
+        observed: Array,
+        seen: Bools,
+        weight: Array,
+        tolerance: Array,
+        reference: int,
+        lens_prior: Array,
+        lens_spread: Array,
+    ) -> None:
+        self.seen = seen
+        self.observed = np.where(seen[..., None], observed, 0.0)
+        self.weight = weight
+        self.tolerance = tolerance
+        self.reference = reference
+        self.lens_prior = lens_prior
+        self.lens_spread = lens_spread
+        # A point spends 3 unknowns on its 2 measurements a frame.
+        self.freedom = np.maximum(2.0 * seen.sum(axis=0) - 3.0, 1.0)
+        self._free = np.delete(np.arange(len(seen)), reference)
+
+    def subset(self, points: NDArray[np.int64]) -> Bundle:
+        """The same window, some of its points."""
+        return Bundle(
+            self.observed[:, points],
+            self.seen[:, points],
+            self.weight[points],
+            self.tolerance[points],
+            self.reference,
+            self.lens_prior,
+            self.lens_spread,
+        )
+
+    def project(self, e: Estimate) -> Projection:
+        """Where the cameras see the points."""
+        bearing = np.column_stack([e.X[:, :2], np.ones(len(e.X))])
+        turned = bearing @ e.R.transpose(0, 2, 1)
+        q = turned + e.X[None, :, 2, None] * e.t[:, None]
+        depth = np.maximum(q[..., 2], _NEAREST)
+        xy = q[..., :2] / depth[..., None]
+        bend = 1 + e.k1 * (xy**2).sum(axis=2, keepdims=True)
+        return Projection(turned, depth, xy, np.exp(e.log_focal) * bend * xy)
+
+    def residual(self, e: Estimate) -> Array:
+        """Projection minus observation (K, P, 2), zero where unseen."""
+        return np.where(self.seen[..., None], self.project(e).u - self.observed, 0.0)
+
+    def rms(self, residual: Array) -> Array:
+        """Root of the mean square residual of each point (P,), normalised units, its own unknowns taken
+        off."""
+        return np.asarray(np.sqrt((residual**2).sum(axis=(0, 2)) / self.freedom))
+
+    def cost(self, residual: Array, width: float) -> float:
+        """Mean of e^2 / (1 + e^2) over the points, e = rms / (width * tolerance): 0 all fit, 1 none does."""
+        square = (self.rms(residual) / (width * self.tolerance)) ** 2
+        return float((self.weight * square / (1 + square)).sum() / self.weight.sum())
+
+    def solve(self, e: Estimate, widths: list[float], translate: bool = True) -> Estimate:
+        """Levenberg-Marquardt, one step per entry of ``widths``, the widths of the robust cost, usually
+        falling.
+
+        ``translate=False`` keeps the cameras in place: they only turn.
+        """
+        damping = 1e-3
+        for width in widths:
+            residual = self.residual(e)
+            step = self._step(e, residual, width, damping, translate)
+            before, after = self.cost(residual, width), self.cost(self.residual(step), width)
+            if after <= before * (1 + 1e-9):
+                e, damping = step, max(damping / 5, 1e-7)
+            else:
+                damping *= 10
+        return e
+
+    def solve_points(self, e: Estimate, iterations: int) -> Estimate:
+        """Points alone, each by itself, cameras fixed."""
+        damping = np.full(len(e.X), 1e-3)
+        residual = self.residual(e)
+        cost = (residual**2).sum(axis=(0, 2))
+        for _ in range(iterations):
+            _, Jx, _ = self._derivatives(e, self.project(e))
+            V = np.einsum("kpia,kpib->pab", Jx, Jx)
+            g = np.einsum("kpia,kpi->pa", Jx, residual)
+            V += (damping[:, None] * np.einsum("paa->pa", V) + 1e-9)[:, :, None] * np.eye(3)
+            X = e.X - np.linalg.solve(V, g[:, :, None])[:, :, 0]
+            behind = X[:, 2] < 0
+            if behind.any():
+                # At the bound the bearing moves with rho held at 0.
+                pull = g[behind, :2] - V[behind, :2, 2] * e.X[behind, 2, None]
+                X[behind, :2] = (
+                    e.X[behind, :2] - np.linalg.solve(V[behind, :2, :2], pull[:, :, None])[:, :, 0]
+                )
+                X[behind, 2] = 0.0
+            moved = replace(e, X=X)
+            new = self.residual(moved)
+            better = (new**2).sum(axis=(0, 2)) <= cost
+            e = replace(e, X=np.where(better[:, None], X, e.X))
+            residual = np.where(better[None, :, None], new, residual)
+            cost = (residual**2).sum(axis=(0, 2))
+            damping = np.where(better, damping / 10, damping * 10)
+        return e
+
+    def depth_sensitivity(self, e: Estimate) -> Array:
+        """How far the picture of a point moves per unit of rho: root of the mean square over its frames
+        (P,)."""
+        _, Jx, _ = self._derivatives(e, self.project(e))
+        square = (Jx[..., 2] ** 2).sum(axis=(0, 2))
+        return np.asarray(np.sqrt(square / np.maximum(self.seen.sum(axis=0), 1)))
+
+    def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array, Array]:
+        """Derivatives of the projections by camera (K, P, 2, 6), point (K, P, 2, 3), lens (K, P, 2, 2); zero
+        where unseen."""
+        f = np.exp(e.log_focal)
+        square = (p.xy**2).sum(axis=2)
+        by_xy = 2 * e.k1 * p.xy[..., :, None] * p.xy[..., None, :]
+        by_xy += (1 + e.k1 * square)[..., None, None] * np.eye(2)
+        by_xy *= (f * self.seen / p.depth)[..., None, None]
+        by_q = np.concatenate([by_xy, -np.einsum("kpij,kpj->kpi", by_xy, p.xy)[..., None]], axis=3)
+        by_camera = np.concatenate([-by_q @ skew(p.turned), by_q * e.X[None, :, 2, None, None]], axis=3)
+        axes = np.stack([e.R[:, :, 0], e.R[:, :, 1], e.t], axis=2)  # dq / d(a, b, rho)
+        by_point = by_q @ axes[:, None]
+        by_lens = np.stack([p.u, f * p.xy * square[..., None]], axis=3) * self.seen[..., None, None]
+        return by_camera, by_point, by_lens
+
+    def _step(self, e: Estimate, residual: Array, width: float, damping: float, translate: bool) -> Estimate:
+        """One damped Gauss-Newton step: points are eliminated, cameras and lens solved, points filled in
+        again."""
+        Jc, Jx, Jl = self._derivatives(e, self.project(e))
+        if not translate:
+            Jc[..., 3:] = 0.0
+            Jx[..., 2] = 0.0
+        square = (self.rms(residual) / (width * self.tolerance)) ** 2
+        weight = self.weight / (1 + square) ** 2 / self.tolerance**2 / self.freedom
+        free, points = self._free, len(e.X)
+        shared = 6 * len(free) + _GLOBALS
+
+        # All derivatives of a point side by side: (P, 2K, cameras and lens), (P, 2K, 3).
+        wide = np.zeros((points, len(e.R), 2, shared))
+        for column, k in enumerate(free):
+            wide[:, k, :, 6 * column : 6 * column + 6] = Jc[k]
+        wide[..., -_GLOBALS:] = Jl.transpose(1, 0, 2, 3)
+        rows = wide.reshape(points, -1, shared)
+        own = Jx.transpose(1, 0, 2, 3).reshape(points, -1, 3)
+        r = residual.transpose(1, 0, 2).reshape(points, -1, 1)
+
+        weighted = rows * weight[:, None, None]
+        flat = rows.reshape(-1, shared)
+        U = weighted.reshape(-1, shared).T @ flat
+        gradient = weighted.reshape(-1, shared).T @ r.ravel()
+        U[-_GLOBALS:, -_GLOBALS:] += np.diag(1 / self.lens_spread**2)
+        gradient[-_GLOBALS:] += (e.lens - self.lens_prior) / self.lens_spread**2
+        own_t = own.transpose(0, 2, 1) * weight[:, None, None]
+        V = own_t @ own
+        trace = np.einsum("paa->p", V) + 1e-12 * float(weight.max(initial=1.0))
+        V = V + (1e-3 * damping * trace)[:, None, None] * np.eye(3) + 1e-12 * trace[:, None, None] * np.eye(3)
+        cross = own_t @ rows  # (P, 3, shared)
+        inverse = np.linalg.inv(V)
+        own_gradient = (own_t @ r)[:, :, 0]
+        eliminated = (inverse @ cross).reshape(-1, shared)
+        S = U - cross.reshape(-1, shared).T @ eliminated
+        S += np.diag(damping * np.diag(U) + 1e-9 * np.trace(U) / shared)
+        shared_step = -np.linalg.solve(S, gradient - eliminated.T @ own_gradient.ravel())
+        own_step = -np.einsum("pab,pb->pa", inverse, own_gradient + cross @ shared_step)
+        return self._moved(e, shared_step, own_step, translate)
+
+    def _moved(self, e: Estimate, shared_step: Array, own_step: Array, translate: bool) -> Estimate:
+        """The estimate after a step, its free scale fixed: root mean square of the camera's distances 1, rho
+        >= 0."""
+        cameras = shared_step[:-_GLOBALS].reshape(-1, 6)
+        R, t = e.R.copy(), e.t.copy()
+        R[self._free] = rotation(cameras[:, :3]) @ e.R[self._free]
+        X = e.X + own_step
+        if translate:
+            t[self._free] += cameras[:, 3:]
+            scale = float(np.sqrt((t**2).sum() / max(len(self._free), 1)))
+            if scale > 1e-9:
+                t /= scale
+                X[:, 2] *= scale
+        X[:, 2] = np.maximum(X[:, 2], 0.0)
+        lens = e.lens + shared_step[-_GLOBALS:]
+        low, high = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
+        log_focal, k1 = np.clip(lens, low, high)
+        return Estimate(R, t, X, float(log_focal), float(k1))

@@ -1,0 +1,112 @@
+"""Stage 4: the over-segmentation that respects motion boundaries, as an MRF (thesis 3.0.4, eq. 3.4 - 3.8)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, QhullError
+
+from ifsvideo.segmentation import trws
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.sampling import AffineModels
+from ifsvideo.types import Bools, Tracks
+
+
+def delaunay_edges(xy: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Edges (E, 2), each once and lower index first, of the Delaunay triangulation of points (N, 2).
+
+    Two points, and points all on one line, have no triangles: they are joined along the line.
+    """
+    if len(xy) < 2:
+        return np.empty((0, 2), dtype=np.int64)
+    try:
+        # QJ joggles, so that no point is dropped where several share a place.
+        simplices = Delaunay(xy, qhull_options="QJ Pp").simplices if len(xy) > 2 else None
+    except QhullError:
+        simplices = None
+    if simplices is None:
+        order = np.lexsort(xy.T)
+        edges = np.stack([order[:-1], order[1:]], axis=1)
+    else:
+        edges = np.concatenate([simplices[:, [0, 1]], simplices[:, [1, 2]], simplices[:, [2, 0]]])
+    return np.unique(np.sort(edges, axis=1), axis=0).astype(np.int64)
+
+
+def similarity(tracks: Tracks, edges: NDArray[np.int64], unit: float, sigma: float) -> NDArray[np.float64]:
+    """Motion similarity alpha_pq of the two ends of every edge (thesis eq. 3.7), in 0..1.
+
+    ``alpha = exp(-(1 + |x_p - x_q|)^2 |v_p - v_q|^2 / (2 sigma^2))``; the squares are means over the frames
+    that both points share, so that an edge between broken tracks is judged by what was measured. Edges
+    without two such frames get 0.
+    """
+    p, q = edges.T
+    xy = tracks.xy / unit
+    velocity = np.diff(xy, axis=0)
+    both = tracks.visible[:, p] & tracks.visible[:, q]
+    step = both[1:] & both[:-1]
+    apart = np.where(both, np.linalg.norm(xy[:, p] - xy[:, q], axis=2), 0.0)
+    slip = np.where(step, ((velocity[:, p] - velocity[:, q]) ** 2).sum(axis=2), 0.0)
+    distance = apart.sum(axis=0) / np.maximum(both.sum(axis=0), 1)
+    shared = step.sum(axis=0)
+    exponent = (1 + distance) ** 2 * slip.sum(axis=0) / np.maximum(shared, 1) / (2 * sigma**2)
+    return np.where(shared > 0, np.exp(-exponent), 0.0)
+
+
+def data_term(
+    residual: NDArray[np.float64],
+    models: AffineModels,
+    background: Bools,
+    unit: float,
+    config: SegmenterConfig,
+) -> NDArray[np.float64]:
+    """Cost D of every model at every point (thesis eq. 3.5), (P, M), pixels.
+
+    The residual where the attribute of point and model agree, else the constant sigma_out. The residual is
+    cut at sigma_out too: a point that no model explains must not pay more for one it resembles than for one
+    it does not.
+    """
+    cost = np.minimum(residual.T / unit, config.outlier_cost)
+    if config.attribute_data:
+        cost = np.where(background[:, None] == ~models.foreground[None, :], cost, config.outlier_cost)
+    return cost
+
+
+def refine(
+    tracks: Tracks,
+    models: AffineModels,
+    residual: NDArray[np.float64],
+    start: NDArray[np.int64],
+    background: Bools,
+    anchor: NDArray[np.float64],
+    unit: float,
+    config: SegmenterConfig,
+) -> tuple[NDArray[np.int64], trws.Solution]:
+    """Minimise the energy of thesis eq. 3.4 by TRW-S.
+
+    Parameters
+    ----------
+    start : (P,) int
+        Labels of stage 3: where the solver starts looking.
+    anchor : (P, 2) float
+        Where the graph's nodes lie, pixels.
+
+    Returns
+    -------
+    labels : (P,) int
+        Index of the model.
+    solution : trws.Solution
+        Energy and lower bound of each iteration.
+    """
+    edges = delaunay_edges(anchor)
+    # eq. 3.4 sums over p and over N(p), so every edge counts twice.
+    weights = 2 * config.motion_weight * similarity(tracks, edges, unit, config.motion_sigma)
+    solution = trws.solve(
+        config.data_weight * data_term(residual, models, background, unit, config),
+        edges,
+        weights,
+        np.full(len(edges), 2 * config.attribute_weight * config.attribute_cost),
+        models.foreground,
+        iterations=config.iterations,
+        initial=start,
+    )
+    return solution.labels, solution

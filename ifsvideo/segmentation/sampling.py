@@ -1,0 +1,134 @@
+"""Stage 2: a pool of affine motion models, sampled in small disks (thesis 3.0.2, Algorithm 1, eq. 3.1,
+3.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.types import Bools, Tracks
+
+# Triples whose triangle is smaller than this share of a disk's area are taken for collinear: eq. 3.2 inverts
+# them.
+_SMALLEST_TRIANGLE = 0.01
+
+
+@dataclass(frozen=True)
+class AffineModels:
+    """The tuples (I_in, C_pts, S) of thesis Algorithm 1 for M models.
+
+    Attributes
+    ----------
+    inliers : (M, P) bool
+    controls : (M, 3, 2) float
+        The three control points in the base frame, pixels.
+    foreground : (M,) bool
+        Attribute S: whether the disk was centred on a foreground point.
+    """
+
+    inliers: Bools
+    controls: NDArray[np.float64]
+    foreground: Bools
+
+    def __len__(self) -> int:
+        return len(self.foreground)
+
+
+def sample_models(
+    tracks: Tracks,
+    background: Bools,
+    base: int,
+    unit: float,
+    config: SegmenterConfig,
+    rng: np.random.Generator,
+) -> AffineModels:
+    """Sample ``config.models`` affine motion models.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Points not seen in the base frame take no part.
+    background : (P,) bool
+        Result of stage 1.
+    base : int
+        The frame in which disks lie and from which motion is counted.
+    unit : float
+        Pixels per configured pixel (the configuration speaks of a 640x480 picture).
+
+    Returns
+    -------
+    AffineModels
+        At most ``config.models``; fewer where no disk holds three points.
+    """
+    usable = tracks.visible[base]
+    pools = [np.flatnonzero(usable & ~background), np.flatnonzero(usable & background)]
+    inliers: list[Bools] = []
+    controls: list[NDArray[np.float64]] = []
+    foreground: list[bool] = []
+    # A disk may hold fewer than three points or only collinear ones; give up after as many failures as
+    # models.
+    for _ in range(2 * config.models):
+        if len(inliers) == config.models or not usable.any():
+            break
+        fg = bool(rng.random() < config.foreground_share)
+        pool = pools[0] if (fg and len(pools[0])) or not len(pools[1]) else pools[1]
+        fg = pool is pools[0]
+        centre = tracks.xy[base, rng.choice(pool)]
+        near = np.linalg.norm(tracks.xy[base] - centre, axis=1) < config.disk_radius * unit  # eq. 3.1
+        support = np.flatnonzero(usable & near)
+        best = _best_triple(tracks, support, base, unit, config, rng)
+        if best is not None:
+            mask = np.zeros(tracks.points, dtype=bool)
+            mask[best[0]] = True
+            inliers.append(mask)
+            controls.append(tracks.xy[base, best[1]])
+            foreground.append(fg)
+    return AffineModels(
+        np.array(inliers, dtype=bool).reshape(-1, tracks.points),
+        np.array(controls, dtype=np.float64).reshape(-1, 3, 2),
+        np.array(foreground, dtype=bool),
+    )
+
+
+def _best_triple(
+    tracks: Tracks,
+    support: NDArray[np.int64],
+    base: int,
+    unit: float,
+    config: SegmenterConfig,
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """Inliers and control points of the triple that explains most of the support, None where no triple
+    serves."""
+    if len(support) < 3:
+        return None
+    triples = np.array([rng.choice(len(support), 3, replace=False) for _ in range(config.ransac_iterations)])
+    xy = tracks.xy[:, support]
+    seen = tracks.visible[:, support]
+    corners = xy[base, triples]
+    edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = np.abs(edge1[:, 0] * edge2[:, 1] - edge1[:, 1] * edge2[:, 0]) / 2
+    triples = triples[area > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2]
+    if not len(triples):
+        return None
+    # eq. 3.2: A_{1->f} = [c_f; 1] [c_1; 1]^-1, so a point is transferred by its barycentric coordinates in
+    # c_1.
+    ones = np.ones((len(triples), 1, 3))
+    barycentric = np.linalg.solve(
+        np.concatenate([xy[base, triples].transpose(0, 2, 1), ones], axis=1),
+        np.broadcast_to(np.vstack([xy[base].T, np.ones(len(support))]), (len(triples), 3, len(support))),
+    )
+    moved = np.einsum("tcp,ftcx->tfpx", barycentric, xy[:, triples])
+    known = seen[None] & seen[:, triples].all(axis=2).T[:, :, None]
+    known[:, base] = False  # the base frame maps to itself
+    with np.errstate(invalid="ignore"):
+        fits = known & (np.linalg.norm(moved - xy[None], axis=3) < config.inlier_error * unit)
+    counted = known.sum(axis=1)
+    inlier = np.asarray((fits.sum(axis=1) >= 0.5 * counted) & (counted > 0))
+    winner = int(np.argmax(inlier.sum(axis=1)))
+    chosen = np.array(inlier[winner])
+    chosen[triples[winner]] = True
+    return support[chosen], support[triples[winner]]

@@ -1,0 +1,62 @@
+"""In-frame shear and stretch, the measure of the thesis (3.1, Algorithm 2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.segmentation.refinement import delaunay_edges
+from ifsvideo.types import Tracks
+
+
+def shear_and_stretch(
+    tracks: Tracks, edges: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Change of orientation (radians) and of length (pixels) of edges between consecutive frames.
+
+    Parameters
+    ----------
+    edges : (E, 2) int
+        Pairs of points.
+
+    Returns
+    -------
+    shear, stretch : (F-1, E) float
+        Absolute changes; NaN where an end is not seen in both frames.
+    """
+    vector = tracks.xy[:, edges[:, 1]] - tracks.xy[:, edges[:, 0]]
+    length = np.linalg.norm(vector, axis=2)
+    before, after = vector[:-1], vector[1:]
+    cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+    shear = np.abs(np.arctan2(cross, (before * after).sum(axis=2)))
+    return shear, np.abs(np.diff(length, axis=0))
+
+
+def score(tracks: Tracks, edges: NDArray[np.int64]) -> float:
+    """Mean over edges and frames of shear plus stretch (Algorithm 2); NaN where no edge was ever measured."""
+    if not len(edges):
+        return float("nan")
+    shear, stretch = shear_and_stretch(tracks, edges)
+    total = shear + stretch
+    return float(np.nanmean(total)) if np.isfinite(total).any() else float("nan")
+
+
+def inside_edges(anchor: NDArray[np.float64], members: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Delaunay edges of a segment's own points: indices of points (E, 2)."""
+    return members[delaunay_edges(anchor[members])]
+
+
+def between_edges(
+    anchor: NDArray[np.float64], first: NDArray[np.int64], second: NDArray[np.int64], pairs: int
+) -> NDArray[np.int64]:
+    """Greedy one-to-one assignment of the ``pairs`` nearest points of two segments: indices of points (E,
+    2)."""
+    distance = np.linalg.norm(anchor[first][:, None] - anchor[second][None], axis=2)
+    chosen: list[tuple[int, int]] = []
+    for flat in np.argsort(distance, axis=None, kind="stable"):
+        i, j = divmod(int(flat), len(second))
+        if all(i != a and j != b for a, b in chosen):
+            chosen.append((i, j))
+            if len(chosen) == min(pairs, len(first), len(second)):
+                break
+    return np.array([(first[i], second[j]) for i, j in chosen], dtype=np.int64).reshape(-1, 2)

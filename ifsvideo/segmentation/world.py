@@ -1,0 +1,183 @@
+"""Stage 1, better than epipolar lines: one static perspective world for all frames of a window at once.
+
+A static point has one place in space, in front of the camera, seen from a camera that moves as one.
+Fundamental matrices of frame pairs test less: they do not see a point that slides along its epipolar line
+(the degenerate case of thesis 2.2), which a common depth over many frames does, nor one behind the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.segmentation.bundle import Bundle, Estimate
+from ifsvideo.types import Bools, Tracks
+
+Array = NDArray[np.float64]
+
+LEAST_USUAL = 0.25
+"""Least usual error, in tolerances: a tenth of a pixel; below it KLT's own errors differ from surface to
+surface."""
+KEY_FRAMES = 9
+"""Frames of a window that are fitted; more cost time and tell little, a camera moves smoothly."""
+NOISE = 0.4
+"""Error that a static point is granted, pixels of a 640x480 picture: KLT is better, but not on every
+surface."""
+NOISE_OF_FLOW = 0.005
+"""Error that a static point is granted, share of its way: rolling shutter and lens are not modelled to the
+pixel."""
+LENS_PRIOR = np.array([np.log(0.8), 0.0])
+"""Focal length in longer sides (dashcams 0.6 to 0.8, phones 0.8 to 1), no distortion."""
+LENS_SPREAD = np.array([0.3, 0.15])
+"""How far the lens is off, each worth one badly fitting point per standard deviation."""
+STARTS = ((0, 0, -1), (1, 0, 0), (0.7, 0, -0.7), (-0.7, 0, -0.7), (0, 1, 0), (0, 0.7, -0.7), (0, -0.7, -0.7))
+"""Directions of the camera's motion from which the fit starts: ahead, aside, half of each; their negatives
+come out of the sign of the first depths."""
+START_POINTS = 150
+"""Points of the starts, thinned so that no corner of the picture has its way."""
+FALLING = [16.0, 8.0, 8.0, 4.0, 4.0, 2.0, 2.0, 1.0]
+"""Widths of the robust cost during a start: first everything counts, at last only what fits."""
+
+
+@dataclass(frozen=True)
+class World:
+    """The static world of a window.
+
+    Attributes
+    ----------
+    frames : (K,) int
+        The frames that were fitted; ``frames[reference]`` defines bearing and depth.
+    estimate : Estimate
+        Cameras and points.
+    rms : (P,) float
+        Distance of each track from what a static point would do, pixels; NaN where it is seen in fewer than
+        two key frames.
+    tolerance : (P,) float
+        What a static point is granted, pixels.
+    sensitivity : (P,) float
+        Pixels per unit of inverse depth.
+    cost : float
+        0 if every point is static, 1 if none is.
+    """
+
+    frames: NDArray[np.int64]
+    reference: int
+    estimate: Estimate
+    rms: Array
+    tolerance: Array
+    sensitivity: Array
+    cost: float
+
+
+def static_evidence(
+    tracks: Tracks, size: tuple[int, int], threshold: float, rng: np.random.Generator
+) -> tuple[Array, Array, World | None]:
+    """How far each track is from a static point's way, in units of ``threshold`` times what is usual in the
+    window.
+
+    The usual error is the median over the points that the world explains at all: footage from a rolling
+    shutter behind a wide lens is granted more than a benchmark's.
+
+    Returns
+    -------
+    evidence : (P,) float
+        Above 1 speaks for motion; 0 where nothing can be said.
+    tolerance : (P,) float
+        Error that a static point is granted, pixels.
+    world : World or None
+    """
+    world = fit_world(tracks, size, rng)
+    if world is None:
+        return np.zeros(tracks.points), np.full(tracks.points, NOISE * float(np.hypot(*size)) / 800), None
+    error = np.nan_to_num(world.rms / world.tolerance)
+    explained = error[(error > 0) & (error < 2)]
+    usual = max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
+    return error / (threshold * usual), world.tolerance, world
+
+
+def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -> World | None:
+    """Fit the static world, several starts, robustly.
+
+    Returns
+    -------
+    World or None
+        None where fewer than 8 points are seen in two key frames: nothing can be said.
+    """
+    frames = np.unique(
+        np.round(np.linspace(0, tracks.frames - 1, min(KEY_FRAMES, tracks.frames))).astype(int)
+    )
+    seen = tracks.visible[frames]
+    good = seen.sum(axis=0) >= 2
+    if good.sum() < 8:
+        return None
+    side = float(max(size))
+    observed = (tracks.xy[frames] - (np.array(size) - 1) / 2) / side
+    unit = float(np.hypot(*size)) / 800 / side
+    columns = np.arange(tracks.points)
+    first = np.argmax(seen, axis=0)
+    last = len(frames) - 1 - np.argmax(seen[::-1], axis=0)
+    way = np.nan_to_num(np.linalg.norm(observed[last, columns] - observed[first, columns], axis=1))
+    tolerance = np.hypot(NOISE * unit, NOISE_OF_FLOW * way)
+    reference = int(np.argmax(seen.sum(axis=1) - 0.01 * np.abs(np.arange(len(frames)) - len(frames) / 2)))
+    nearest = np.argmin(np.where(seen, np.abs(np.arange(len(frames)) - reference)[:, None], 999), axis=0)
+    place = np.nan_to_num(observed[nearest, columns])
+    cell = np.floor((place + 0.5) * 16).astype(int) @ [1, 1000]
+    _, inverse, count = np.unique(cell, return_inverse=True, return_counts=True)
+    weight = np.where(good, 1 / np.sqrt(count[inverse]), 0.0)  # dense texture does not outvote the rest
+    bundle = Bundle(observed, seen & good, weight, tolerance, reference, LENS_PRIOR, LENS_SPREAD)
+
+    picked = _thin(seen, cell, good, rng)
+    time = (frames - frames[reference]) / max(frames[-1] - frames[0], 1)
+    X = np.column_stack([place / np.exp(LENS_PRIOR[0]), np.zeros(tracks.points)])
+    start = _best_start(bundle.subset(picked), X[picked], time)
+    X[:, :2] *= np.exp(LENS_PRIOR[0] - start.log_focal)
+    X[:, 2] = np.median(start.X[:, 2])
+    X[picked] = start.X
+    estimate = bundle.solve_points(replace(start, X=X), 6)
+    estimate = bundle.solve_points(bundle.solve(estimate, [1.0] * 6), 3)
+    residual = bundle.residual(estimate)
+    return World(
+        frames,
+        reference,
+        estimate,
+        np.where(good, bundle.rms(residual) * side, np.nan),
+        tolerance * side,
+        bundle.depth_sensitivity(estimate) * side,
+        bundle.cost(residual, 1.0),
+    )
+
+
+def _thin(seen: Bools, cell: NDArray[np.int64], good: Bools, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Long-lived points, at most three a cell of the picture."""
+    order = np.argsort(-seen.sum(axis=0) - rng.random(seen.shape[1]) / 2)
+    order = order[good[order]]
+    rank = np.zeros(len(order), dtype=int)
+    taken: dict[int, int] = {}
+    for k, point in enumerate(order):
+        rank[k] = taken[int(cell[point])] = taken.get(int(cell[point]), 0) + 1
+    return np.sort(order[np.argsort(rank, kind="stable")[: min(START_POINTS, np.count_nonzero(rank <= 3))]])
+
+
+def _best_start(bundle: Bundle, X: Array, time: Array) -> Estimate:
+    """The best of several starts: a camera that turns, then moves with constant speed in one of some
+    directions."""
+    cameras = len(time)
+    rest = Estimate(
+        np.repeat(np.eye(3)[None], cameras, axis=0), np.zeros((cameras, 3)), X, LENS_PRIOR[0], 0.0
+    )
+    turned = bundle.solve(rest, [32.0, 16.0, 8.0, 4.0, 2.0, 1.0], translate=False)
+    near = X.copy()
+    near[:, :2] = turned.X[:, :2]
+    near[:, 2] = 0.03  # 30 times the camera's way: far enough for any first step
+    found: list[tuple[float, int, Estimate]] = []
+    for direction in STARTS:
+        t = 2 * time[:, None] * np.array(direction, dtype=float)
+        estimate = bundle.solve(replace(turned, t=t, X=near), FALLING)
+        found.append((bundle.cost(bundle.residual(estimate), 1.0), len(found), estimate))
+    finished = []
+    for _, k, estimate in sorted(found, key=lambda item: item[:2])[:3]:
+        better = bundle.solve(estimate, [2.0] + [1.0] * 12)
+        finished.append((bundle.cost(bundle.residual(better), 1.0), k, better))
+    return min(finished, key=lambda item: item[:2])[2]
