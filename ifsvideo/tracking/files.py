@@ -62,10 +62,11 @@ def load_tracks(path: str | Path) -> Tracks:
 
 
 def _from_npz(file: Path) -> Tracks:
-    loaded = np.load(file, allow_pickle=False)
-    if isinstance(loaded, np.ndarray):
-        raise InputError("holds a single array; write it by numpy.savez(file, xy=array)")
-    with loaded as content:
+    # A stream of our own: numpy leaves the file open where it finds the archive damaged.
+    with file.open("rb") as stream:
+        content = np.load(stream, allow_pickle=False)
+        if isinstance(content, np.ndarray):
+            raise InputError("holds a single array; write it by numpy.savez(file, xy=array)")
         fields = {name: content[name] for name in ("xy", "visible", "ids") if name in content}
         if "xy" not in fields:
             raise InputError(f"has no field xy, only {', '.join(content) or 'nothing'}; give {LAYOUTS}")
