@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 from tqdm import tqdm
 
@@ -109,7 +110,7 @@ class _Bars:
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
         self._stage = ""
-        self._bar: tqdm[None] | None = None
+        self._bar: tqdm[Any] | None = None
 
     def show(self, stage: str, done: int, total: int | None) -> None:
         """A `ifsvideo.types.Progress`."""
@@ -118,10 +119,13 @@ class _Bars:
         if self._bar is None or stage != self._stage:
             self._close()
             self._stage = stage
-            unit = "window" if stage == "segmenting" else "frame"
-            self._bar = tqdm(desc=stage, total=total, unit=unit, file=sys.stderr, dynamic_ncols=True)
+            self._bar = self._new(stage, total)
         self._bar.total = total
         self._bar.update(done - self._bar.n)
+
+    def _new(self, stage: str, total: int | None) -> tqdm[Any]:
+        unit = "window" if stage == "segmenting" else "frame"
+        return tqdm(desc=stage, total=total, unit=unit, file=sys.stderr, dynamic_ncols=True)
 
     def _close(self) -> None:
         if self._bar is not None:

@@ -78,14 +78,14 @@ def open_clip(source: Source, fps: Fraction | None, start: float, end: float | N
     if path is not None and not is_tracks_file(path):
         frames = open_source(path, fps=fps, start=start, end=end)
         return Clip(str(path), frames.info, path, frames=frames)
-    name = str(path) if path is not None else type(source).__name__
+    name = str(path or type(source).__name__)
     if start != 0.0 or end is not None:
         raise UsageError(f"{name}: is taken whole; leave out start and end")
     if isinstance(source, FrameSource):
         if fps is not None:
             raise UsageError(f"{name}: is open already and has its rate; leave out fps")
         return Clip(str(source.path), source.info, source.path, frames=source)
-    tracks = load_tracks(path) if path is not None else as_tracks(source)
+    tracks = load_tracks(source) if isinstance(source, str | Path) else as_tracks(source)
     info = _info_of(tracks, fps)
     return Clip(name, info, path, trajectories=Trajectories.from_tracks(replace(tracks, fps=float(info.fps))))
 

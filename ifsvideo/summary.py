@@ -51,7 +51,7 @@ def _points(result: Result) -> str:
     shares = [np.mean(part) for part in (table.labels == 0, table.labels > 0, table.labels < 0)]
     words = ("background", "moving", "undecided")
     parts = ", ".join(f"{100 * share:.1f} % {word}" for share, word in zip(shares, words, strict=True))
-    return f"{_count(len(np.unique(table.ids)), 'track')}: {parts}"
+    return f"{_count(len(np.unique(table.ids)), 'track')}; of all rows {parts}"
 
 
 def _speed(result: Result, seconds: float) -> str:

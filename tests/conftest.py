@@ -51,7 +51,7 @@ def encode(path: Path, images: list[np.ndarray], *options: str) -> Path:
     """Write images as a video with ffmpeg."""
     height, width = images[0].shape[:2]
     command = [FFMPEG, "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
-    command += ["-r", str(FPS), "-i", "-", *options, "-pix_fmt", "yuv420p", str(path)]
+    command += ["-r", str(FPS), "-i", "-", "-pix_fmt", "yuv420p", *options, str(path)]
     subprocess.run(command, input=b"".join(image.tobytes() for image in images), check=True)
     return path
 

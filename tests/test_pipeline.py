@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,9 +10,11 @@ import ifsvideo
 from ifsvideo.config import Config, TrackerConfig
 from ifsvideo.errors import InputError, OutputError, UsageError
 from ifsvideo.pipeline import Pipeline
-from ifsvideo.types import FramePoints, Segmentation, Tracks
+from ifsvideo.summary import summary
+from ifsvideo.types import FramePoints, Segmentation, Tracks, VideoInfo
+from ifsvideo.video import FrameSource
 
-from .conftest import FPS, HEIGHT, WIDTH, decoded, pictures
+from .conftest import FPS, HEIGHT, WIDTH, decoded, encode, pictures
 
 
 class ByStep:
@@ -186,6 +189,35 @@ def test_rate_of_tracks_can_be_told(pipeline):
 def test_what_tracks_cannot(pipeline, options, complaint):
     with pytest.raises(UsageError, match=complaint):
         pipeline.run(tracks_of_two_motions(), **options)
+
+
+class Short(FrameSource):
+    """Promises ten frames and gives six."""
+
+    path = Path("short.mp4")
+    info = VideoInfo(WIDTH, HEIGHT, Fraction(FPS), frames=10)
+
+    def frames(self):
+        yield from pictures(6)
+        self.warnings = ("short.mp4: only 6 of 10 frames",)
+
+
+def test_fewer_frames_than_promised_are_a_warning(pipeline, tmp_path):
+    result = pipeline.run(Short(), tmp_path / "o.mp4", tmp_path / "o.csv")
+    assert result.table.frames == 6
+    assert decoded(tmp_path / "o.mp4")[0] == 6
+    assert result.warnings == ("short.mp4: only 6 of 10 frames",)
+    assert "warning     short.mp4: only 6 of 10 frames" in summary("short.mp4", result, 2.0)
+    for options in ({"start": 1.0}, {"fps": 5.0}):
+        with pytest.raises(UsageError, match="leave out"):
+            pipeline.run(Short(), **options)
+
+
+def test_an_odd_side_is_a_warning(pipeline, tmp_path):
+    source = encode(tmp_path / "odd.mkv", pictures(3, 101, 75), "-c:v", "ffv1", "-pix_fmt", "bgr0")
+    result = pipeline.run(source, tmp_path / "o.mp4")
+    assert decoded(tmp_path / "o.mp4")[:2] == (3, (102, 76))
+    assert "padded by one pixel" in " ".join(result.warnings)
 
 
 @pytest.mark.parametrize("area", [(0, 0, 5000, 1), (WIDTH, 0, 5, 5), np.zeros((3, 4), bool)])
