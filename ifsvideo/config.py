@@ -43,6 +43,14 @@ class TrackerConfig:
     """Longest step between two frames, share of the diagonal; further, KLT's pyramid finds by chance only."""
     min_similarity: float = 0.6
     """Least correlation of the patch with that of the frame before; other surfaces' is 0 +- 0.3."""
+    check_interval: int = 8
+    """Frames between two comparisons of a track with the patch of its birth; KLT slides by tenths of a pixel
+    a frame, and to check every track in every frame would cost as much as KLT itself."""
+    min_resemblance: float = 0.5
+    """Least correlation with the patch of its birth, after an affine alignment; else the track has slid off.
+    Leaves and branches, whose parts move against each other, stay at 0.6 to 0.8 for a second."""
+    max_drift: float = 0.004
+    """Farthest that this alignment may move a point, share of the diagonal: 3 px at 640x360."""
     margin: float = 0.01
     """Distance from the picture's edge at which a track ends, share of the diagonal: the window looks out."""
 
@@ -51,13 +59,13 @@ class TrackerConfig:
             raise UsageError(f"tracking.max_points must be 1 to 30000, got {self.max_points}")
         if self.window < 5 or self.window % 2 == 0:
             raise UsageError(f"tracking.window must be odd and at least 5, got {self.window}")
-        for name in ("cells", "birth_interval"):
+        for name in ("cells", "birth_interval", "check_interval"):
             if getattr(self, name) < 1:
                 raise UsageError(f"tracking.{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("crowding", "min_distance", "min_contrast", "max_return_error", "max_step"):
+        for name in ("crowding", "min_distance", "min_contrast", "max_return_error", "max_step", "max_drift"):
             if not getattr(self, name) > 0:
                 raise UsageError(f"tracking.{name} must be positive, got {getattr(self, name)}")
-        for name in ("quality", "min_similarity", "margin"):
+        for name in ("quality", "min_similarity", "min_resemblance", "margin"):
             if not 0 <= getattr(self, name) < 1:
                 raise UsageError(f"tracking.{name} must be at least 0 and below 1, got {getattr(self, name)}")
 
@@ -93,8 +101,8 @@ class ObjectsConfig:
     """
 
     window_s: float = 1.0
-    """Length of a window, seconds: long enough for a car to move against its surroundings, short enough for half
-    the tracks to last."""
+    """Length of a window, seconds: long enough for a car to move against its surroundings, short enough for
+    half the tracks to last."""
     window_frames: int = 30
     """Most frames of a window; more cost time and tell little."""
     least_frames: int = 12

@@ -12,11 +12,17 @@ Patches = NDArray[np.float32]
 """(N, K) float32: the pixels of N patches, each of mean 0 and length 1 (0 where there is no contrast)."""
 
 
+def grid(radius: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Offsets x and y (K,) of a patch's pixels from its centre, row by row."""
+    y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1).astype(np.float32)
+    return x, y
+
+
 def cut(grey: Image, xy: NDArray[np.float32], radius: int) -> Patches:
     """Patches of side 2 radius + 1 around points (N, 2), between pixels by bilinear interpolation."""
     if len(xy) == 0:
         return np.empty((0, (2 * radius + 1) ** 2), np.float32)
-    y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1).astype(np.float32)
+    x, y = grid(radius)
     pixels = cv2.remap(
         grey, xy[:, :1] + x, xy[:, 1:] + y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     ).astype(np.float32)

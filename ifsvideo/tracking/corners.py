@@ -17,6 +17,11 @@ SOBEL_GAIN = 255.0 / 2.0
 """Back to grey levels per pixel: cv2.cornerMinEigenVal divides a 3x3 Sobel response (8 times the gradient) by
 4 x 255 before it squares."""
 
+NEEDY = 0.5
+"""Share of its fair share of points below which a cell gets some even at the cost of others."""
+ROUNDS = 4
+"""Rounds of suppression; on real pictures the first finds about half the corners that fit, the fourth few."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -55,7 +60,7 @@ class Grid:
 def find_corners(
     grey: Image, taken: NDArray[np.float32], allowed: Bools, config: TrackerConfig
 ) -> NDArray[np.float32]:
-    """New corners where the picture has room for them.
+    """New corners where the picture has room for them, and beyond that in cells that are all but empty.
 
     A corner is a local maximum of the smaller eigenvalue of the gradients' second moments, as strong as a
     share of the strongest of its own cell, and stronger than noise. The emptiest cells are served first.
@@ -76,23 +81,18 @@ def find_corners(
     Returns
     -------
     (M, 2) float32
-        Pixels; M <= max_points - N, by growing crowdedness of the cell, then by falling strength.
+        Pixels, by growing crowdedness of the cell, then by falling strength. More than max_points - N only
+        where cells hold less than `NEEDY` of their fair share: what comes into view there must get points.
     """
     height, width = grey.shape
     room = config.max_points - len(taken)
-    if room <= 0:
-        return np.empty((0, 2), np.float32)
     diagonal = math.hypot(width, height)
     distance = max(2, round(config.min_distance * diagonal))
     strength = cv2.cornerMinEigenVal(grey, 5, ksize=3)
-    free = allowed & ~_surroundings(taken, grey.shape, distance)
-    # A maximum of its whole neighbourhood, so that corners keep their distance without a greedy search.
-    kernel = np.ones((2 * distance + 1, 2 * distance + 1), np.uint8)
-    peaks = (strength >= cv2.dilate(np.where(free, strength, 0), kernel)) & free
-    peaks &= strength >= (config.min_contrast / SOBEL_GAIN) ** 2
-    y, x = np.nonzero(peaks)
-    xy = np.stack([x, y], axis=1).astype(np.float32)
-    found = np.asarray(strength[y, x], np.float32)
+    strong = strength >= (config.min_contrast / SOBEL_GAIN) ** 2
+    free = allowed & strong & ~_surroundings(taken, grey.shape, distance)
+    xy = _peaks(np.asarray(strength, np.float32), free, distance, room)
+    found = np.asarray(strength[tuple(xy.T[::-1].astype(np.int64))], np.float32)
 
     grid = Grid.cover(width, height, config.cells)
     cell = grid.cell_of(xy)
@@ -104,8 +104,39 @@ def find_corners(
     crowd = np.bincount(grid.cell_of(taken), minlength=grid.cells).astype(np.int64)[cell]
     crowd += _rank_within(cell, found)
     order = np.lexsort((-found, crowd))
-    order = order[crowd[order] < config.crowding * config.max_points / grid.cells]
-    return _apart(xy[order], distance)[:room]
+    share = config.max_points / grid.cells
+    order = order[crowd[order] < config.crowding * share]
+    # With less than one point a cell there is no fair share, and points would only chase each other away.
+    urgent = int(np.count_nonzero(crowd[order] < NEEDY * share)) if share >= 1 else 0
+    return xy[order][: max(0, room, urgent)]
+
+
+def most_crowded(
+    xy: NDArray[np.float32], width: int, height: int, number: int, cells: int
+) -> NDArray[np.int64]:
+    """Indices of the points (N, 2) to give up when ``number`` must go: the last of the fullest cells."""
+    cell = Grid.cover(width, height, cells).cell_of(xy)
+    rank = _rank_within(cell, -np.arange(len(xy), dtype=np.float32))
+    return np.argsort(-rank, kind="stable")[:number]
+
+
+def _peaks(strength: NDArray[np.float32], free: Bools, distance: int, enough: int) -> NDArray[np.float32]:
+    """Maxima (N, 2) of their whole neighbourhood, then those of what these leave free, until enough.
+
+    The same as taking the strongest pixel left again and again, for all places at once.
+    """
+    kernel = np.ones((2 * distance + 1, 2 * distance + 1), np.uint8)
+    found = [np.empty((0, 2), np.float32)]
+    for _ in range(ROUNDS):
+        open_strength = np.where(free, strength, 0)
+        y, x = np.nonzero((open_strength >= cv2.dilate(open_strength, kernel)) & free)
+        if len(x) == 0:
+            break
+        found.append(_apart(np.stack([x, y], axis=1).astype(np.float32), distance))
+        if sum(map(len, found)) >= enough:
+            break
+        free = free & ~_surroundings(found[-1], free.shape, distance)
+    return np.concatenate(found)
 
 
 def _surroundings(points: NDArray[np.float32], shape: tuple[int, ...], distance: int) -> Bools:

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from ifsvideo.config import TrackerConfig
 from ifsvideo.errors import UsageError
 from ifsvideo.tracking.appearance import correlation, cut
-from ifsvideo.tracking.corners import find_corners
+from ifsvideo.tracking.corners import find_corners, most_crowded
+from ifsvideo.tracking.drift import References
 from ifsvideo.tracking.klt import Search, flatten, follow
 from ifsvideo.types import Bools, FramePoints, Image
 
@@ -24,6 +25,8 @@ LARGEST = 2300.0
 KLT's window stays 21 px, and what it sees of a 4K picture is then what it sees of a 1080-line one."""
 SUDDEN_LOSS = 0.3
 """Share of the tracks whose loss in one frame points to a jump of exposure (or a cut): worth a second try."""
+CUT = 0.2
+"""Share of the tracks below which those that seem to go on, do so by chance: another picture has begun."""
 COLLAPSED = 0.4
 """Share of the least distance of corners below which two tracks follow the same thing."""
 
@@ -80,6 +83,7 @@ class _Life:
         self.allowed = self._allowed(ignore)
         self.ids = np.empty(0, np.int64)
         self.xy = np.empty((0, 2), np.float32)
+        self.references = References.none(self.search.window // 3)
         self.previous: Image | None = None
         self.next_id = 0
         self.frame = 0
@@ -106,10 +110,27 @@ class _Life:
             again, found = self._step(flatten(before), flatten(after), self.xy[lost])
             moved[lost[found]] = again[found]
             alive[lost[found]] = True
+            if np.mean(alive) < CUT:
+                alive[:] = False
         alive &= self._inside(moved)
-        self.ids, self.xy = self.ids[alive], moved[alive]
-        distinct = self._distinct(self.xy)
-        self.ids, self.xy = self.ids[distinct], self.xy[distinct]
+        self.xy = moved
+        self._keep(alive)
+        self._keep(self._distinct(self.xy))
+        self._keep(self._faithful(after))
+
+    def _keep(self, which: Bools) -> None:
+        """End all other tracks."""
+        self.ids, self.xy = self.ids[which], self.xy[which]
+        self.references.keep(which)
+
+    def _faithful(self, grey: Image) -> Bools:
+        """Whether each track still sees what it saw at birth; those whose turn it is are checked."""
+        turn = np.flatnonzero((self.ids + self.frame) % self.config.check_interval == 0)
+        verdict = self.references.check(grey, self.xy[turn], turn)
+        faithful = np.ones(len(self.ids), bool)
+        faithful[turn] = verdict.similarity >= self.config.min_resemblance
+        faithful[turn] &= verdict.offset <= max(1.0, self.config.max_drift * self.diagonal)
+        return faithful
 
     def _step(
         self, before: Image, after: Image, xy: NDArray[np.float32]
@@ -119,15 +140,21 @@ class _Life:
         moved, return_error = follow(before, after, xy, self.search)
         believed = return_error <= max(0.5, config.max_return_error * self.diagonal)
         believed &= np.hypot(*(moved - xy).T) <= config.max_step * self.diagonal
-        radius = self.search.window // 3
+        radius = self.references.radius
         similar = correlation(cut(before, xy, radius), cut(after, moved, radius))
         return moved, believed & (similar >= config.min_similarity)
 
     def _bear(self, grey: Image) -> None:
         """Let new tracks begin where the picture has room."""
         born = find_corners(grey, self.xy, self.allowed, self.config)
+        surplus = len(self.ids) + len(born) - self.config.max_points
+        if surplus > 0:
+            keep = np.ones(len(self.ids), bool)
+            keep[most_crowded(self.xy, self.width, self.height, surplus, self.config.cells)] = False
+            self._keep(keep)
         self.ids = np.concatenate([self.ids, self.next_id + np.arange(len(born), dtype=np.int64)])
         self.xy = np.concatenate([self.xy, born])
+        self.references.add(grey, born)
         self.next_id += len(born)
         self.after_birth = len(self.ids)
 
