@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,11 +21,15 @@ SIZE = (640, 360)
 
 @dataclass(frozen=True)
 class Clip:
-    """A decoded clip, grey (F, H, W), with what its truth file holds."""
+    """A decoded clip, grey (F, H, W), what ffmpeg says of its stream, and what its truth file holds."""
 
     grey: NDArray[np.uint8]
-    fps: float
+    stream: str
     truth: dict[str, NDArray[np.generic]]
+
+    @property
+    def fps(self) -> float:
+        return float(re.search(r"([\d.]+) fps", self.stream)[1])  # type: ignore[index]
 
     @property
     def masks(self) -> NDArray[np.uint8]:
@@ -32,13 +38,22 @@ class Clip:
 
 @cache
 def load(name: str) -> Clip:
-    reader = imageio_ffmpeg.read_frames(str(FOLDER / f"{name}.mp4"), pix_fmt="gray")
-    meta = next(reader)
-    assert meta["size"] == SIZE
-    frames = [np.frombuffer(raw, np.uint8).reshape(SIZE[1], SIZE[0]) for raw in reader]
+    pipe = [
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-i",
+        str(FOLDER / f"{name}.mp4"),
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "gray",
+        "-",
+    ]
+    done = subprocess.run(pipe, capture_output=True, check=True)
+    frames = np.frombuffer(done.stdout, np.uint8).reshape(-1, SIZE[1], SIZE[0])
+    stream = next(line for line in done.stderr.decode().splitlines() if "Video:" in line)
     with np.load(FOLDER / f"{name}_truth.npz") as file:
         truth = {key: file[key] for key in file.files}
-    return Clip(np.array(frames), float(meta["fps"]), truth)
+    return Clip(frames, stream, truth)
 
 
 @pytest.mark.parametrize("name", MOVERS)
@@ -64,9 +79,10 @@ def test_files_are_small_and_fit_each_other(name: str) -> None:
 def test_mp4_plays_in_a_browser(name: str) -> None:
     data = (FOLDER / f"{name}.mp4").read_bytes()
     assert data.find(b"moov") < data.find(b"mdat"), "not faststart"
-    meta = next(imageio_ffmpeg.read_frames(str(FOLDER / f"{name}.mp4")))
-    assert meta["codec"] == "h264"
-    assert str(meta["pix_fmt"]).startswith("yuv420p")
+    stream = load(name).stream
+    assert "h264" in stream
+    assert "yuv420p" in stream
+    assert f"{SIZE[0]}x{SIZE[1]}" in stream
 
 
 @pytest.mark.parametrize("name", [name for name, movers in MOVERS.items() if movers])

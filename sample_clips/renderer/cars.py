@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -252,6 +253,7 @@ def _flank(rng: Generator, s: Shape, colour: Colour, side: int) -> Face:
     cv2.rectangle(
         rgb, pixel(s.length - 0.3, s.bonnet - 0.03), pixel(s.length, s.bonnet - 0.17), (232, 236, 240), -1
     )
+    _fender(rgb, pixel, s)
     for z in s.wheels:
         _wheel(rgb, body, pixel(z, WHEEL))
     picture = np.dstack([rgb, body])
@@ -261,6 +263,17 @@ def _flank(rng: Generator, s: Shape, colour: Colour, side: int) -> Face:
     return rectangle(
         (x, -height, z1), (0, 0, z0 - z1), (0, height, 0), np.ascontiguousarray(picture[:, ::-1])
     )
+
+
+def _fender(rgb: Picture, pixel: Callable[[float, float], tuple[int, int]], s: Shape) -> None:
+    """Small parts ahead of the front wheel: indicator, panel gap, reflectors, lamp: corners to hold on to."""
+    z = s.length
+    cv2.line(rgb, pixel(z - 0.34, s.bonnet), pixel(z - 0.34, s.sill + 0.1), (26, 26, 28), 2)
+    cv2.rectangle(rgb, pixel(z - 0.31, s.bonnet - 0.19), pixel(z - 0.02, s.bonnet - 0.25), (238, 136, 30), -1)
+    cv2.rectangle(rgb, pixel(z - 0.2, s.sill + 0.2), pixel(z - 0.06, s.sill + 0.12), (226, 226, 222), -1)
+    cv2.rectangle(rgb, pixel(z - 0.2, s.sill + 0.08), pixel(z - 0.1, s.sill + 0.02), (206, 60, 36), -1)
+    cv2.rectangle(rgb, pixel(z - 0.14, s.bonnet - 0.06), pixel(z - 0.05, s.bonnet - 0.14), (70, 76, 86), -1)
+    cv2.rectangle(rgb, pixel(z - 1.3, 0.72), pixel(z - 1.18, 0.67), (238, 136, 30), -1)
 
 
 def _wheel(rgb: Picture, body: Picture, centre: tuple[int, int]) -> None:

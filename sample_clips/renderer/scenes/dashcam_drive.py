@@ -36,22 +36,23 @@ def build() -> Scene:
         return pose((x, -1.32 + heave(t) - bump(t, 1.15, 0.02), z), yaw, pitch, shake[2](t))
 
     def oncoming(t: float) -> Array:
-        return course.at(110.0 - 9.0 * t, LANES[0] - 0.15 + 0.2 * np.sin(1.1 * t), np.pi)
+        return course.at(65.0 - 8.0 * t, LANES[0] - 0.15 + 0.2 * np.sin(1.1 * t), np.pi)
 
     def overtaking(t: float) -> Array:
-        cut_in = smoothstep(t, 2.0, 4.3)
-        z = -0.5 + 17.8 * t + 0.9 * (1 - np.cos(0.9 * t)) - 0.35 * max(t - 2.5, 0) ** 2
-        lateral = LANES[1] - 0.1 + (LANES[2] - LANES[1]) * cut_in
+        since = t - 1.3
+        ahead = -0.5 + 4.8 * since + 0.9 * (1 - np.cos(0.9 * since)) - 0.35 * max(since - 2.5, 0) ** 2
         step = 0.02
-        steer = (smoothstep(t + step, 2.0, 4.3) - smoothstep(t - step, 2.0, 4.3)) * 3.5 / (2 * step) / 17.5
-        return course.at(z, lateral, float(np.arctan(steer)))
+        before, now, after = (smoothstep(t + dt, 3.0, 4.9) for dt in (-step, 0.0, step))
+        lateral = LANES[1] - 0.1 + (LANES[2] - LANES[1]) * now
+        steer = (after - before) * (LANES[2] - LANES[1]) / (2 * step) / (SPEED + 4.5)
+        return course.at(SPEED * t + ahead, lateral, float(np.arctan(steer)))
 
     red = car(rng, VAN, (168, 32, 34), "KX 4071", "1.8i")
-    blue = car(rng, HATCH, (52, 84, 150), "MB 2659", "GT")
+    orange = car(rng, HATCH, (224, 112, 26), "MB 2659", "GT")
     bodies = (
         street,
         Body(red, 1, "oncoming van", oncoming, car_shadow(VAN)),
-        Body(blue, 2, "overtaking car", overtaking, car_shadow(HATCH)),
+        Body(orange, 2, "overtaking car", overtaking, car_shadow(HATCH)),
         ground(rng, course, strip),
     )
     return Scene(
