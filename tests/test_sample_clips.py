@@ -7,6 +7,7 @@ import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import cv2
 import imageio_ffmpeg
@@ -25,7 +26,7 @@ class Clip:
 
     grey: NDArray[np.uint8]
     stream: str
-    truth: dict[str, NDArray[np.generic]]
+    truth: dict[str, NDArray[Any]]
 
     @property
     def fps(self) -> float:
@@ -155,8 +156,8 @@ def baseline(clip: Clip, gap: int = 5) -> tuple[float, float]:
             before = at
             for index in range(start + step * gap, start + (step + 1) * gap):
                 last = at
-                at, ok, _ = cv2.calcOpticalFlowPyrLK(clip.grey[index], clip.grey[index + 1], at, None)
-                back, _, _ = cv2.calcOpticalFlowPyrLK(clip.grey[index + 1], clip.grey[index], at, None)
+                at, ok, _ = cv2.calcOpticalFlowPyrLK(clip.grey[index], clip.grey[index + 1], at, np.empty(0))
+                back, _, _ = cv2.calcOpticalFlowPyrLK(clip.grey[index + 1], clip.grey[index], at, np.empty(0))
                 alive &= (ok[:, 0] > 0) & (np.linalg.norm(back - last, axis=2)[:, 0] < 1.0)
             _, fits = cv2.findHomography(before[alive], at[alive], cv2.RANSAC, 3.0)
             outlier = np.zeros(len(corners), bool)

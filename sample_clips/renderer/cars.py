@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from renderer.geometry import Face, moved, polygon, rectangle
+from renderer.geometry import Array, Face, moved, polygon, rectangle
 from renderer.paint import Colour, Generator, Picture, noise, plain, shade, soft_shadow, to_picture
 
 PPM = 110
@@ -61,14 +61,12 @@ def car(rng: Generator, shape: Shape, colour: Colour, plate: str, badge: str) ->
     belt_f, roof_f = (s.front_glass[0], s.belt, w), (s.front_glass[1], s.roof, r)
     nose = (s.length, s.bonnet, w)
     faces = [
-        across(
-            (0.0, s.sill, w), tail, _tail(rng, s, canvas(2 * w, s.tail - s.sill, 0.92), plate, badge), True
-        ),
+        across((0.0, s.sill, w), tail, _tail(canvas(2 * w, s.tail - s.sill, 0.92), plate, badge), True),
         across(belt_r, roof_r, _glass(rng, 2 * w, _slant(belt_r, roof_r), colour, rear=True), True),
         across(roof_r, roof_f, _ribs(canvas(2 * r, roof_f[0] - roof_r[0], 1.15)), True),
         across(belt_f, roof_f, _glass(rng, 2 * w, _slant(belt_f, roof_f), colour, rear=False), False),
         across(nose, belt_f, _ribs(canvas(2 * w, _slant(nose, belt_f), 1.12)), False),
-        across((s.length, s.sill, w), nose, _front(rng, s, canvas(2 * w, s.bonnet - s.sill), plate), False),
+        across((s.length, s.sill, w), nose, _front(canvas(2 * w, s.bonnet - s.sill), plate), False),
     ]
     if belt_r[0] > 0.1:
         faces.append(across(tail, belt_r, canvas(2 * w, _slant(tail, belt_r), 1.1), True))
@@ -89,7 +87,7 @@ def car_shadow(shape: Shape, strength: float = 0.34) -> tuple[Face, ...]:
     return (rectangle((-x, -0.005, z), (2 * x, 0, 0), (0, 0, -2 * z), soft_shadow(strength), closed=False),)
 
 
-def parked(rng: Generator, shape: Shape, colour: Colour, plate: str, place: np.ndarray) -> tuple[Face, ...]:  # type: ignore[type-arg]
+def parked(rng: Generator, shape: Shape, colour: Colour, plate: str, place: Array) -> tuple[Face, ...]:
     """Faces of a car that stays at the pose ``place``."""
     return tuple(moved(face, place) for face in car(rng, shape, colour, plate, "GL"))
 
@@ -126,7 +124,7 @@ def _ribs(picture: Picture) -> Picture:
     return picture
 
 
-def _tail(rng: Generator, s: Shape, picture: Picture, plate: str, badge: str) -> Picture:
+def _tail(picture: Picture, plate: str, badge: str) -> Picture:
     h, w = picture.shape[:2]
     p = PPM
     cv2.rectangle(picture, (0, h - int(0.24 * p)), (w, h), (44, 45, 48), -1)
@@ -156,7 +154,7 @@ def _tail(rng: Generator, s: Shape, picture: Picture, plate: str, badge: str) ->
     return picture
 
 
-def _front(rng: Generator, s: Shape, picture: Picture, plate: str) -> Picture:
+def _front(picture: Picture, plate: str) -> Picture:
     h, w = picture.shape[:2]
     p = PPM
     cv2.rectangle(picture, (int(0.24 * w), int(0.1 * p)), (int(0.76 * w), int(0.27 * p)), (24, 25, 28), -1)

@@ -8,6 +8,7 @@ import imageio_ffmpeg
 import numpy as np
 
 from renderer.film import SIZE, Scene, shoot
+from renderer.geometry import Array, Picture
 
 
 def write(scene: Scene, folder: Path) -> Path:
@@ -36,7 +37,7 @@ def write(scene: Scene, folder: Path) -> Path:
     return clip
 
 
-def _write_truth(scene: Scene, path: Path, masks: np.ndarray, reach: np.ndarray) -> None:  # type: ignore[type-arg]
+def _write_truth(scene: Scene, path: Path, masks: Picture, reach: Array) -> None:
     times = np.arange(scene.frames) / scene.fps
     movers = sorted((b for b in scene.bodies if b.pose is not None), key=lambda b: b.label)
     poses = [[b.pose(t) for b in movers if b.pose is not None] for t in times]
