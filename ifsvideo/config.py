@@ -34,8 +34,9 @@ class TrackerConfig:
     standard deviation of 4 grey levels stays below it after Sobel's smoothing (factor sqrt(12) / 8)."""
     birth_interval: int = 3
     """Frames between two searches for new corners; at 30 a second an empty place is filled within 0.1 s."""
-    window: int = 21
-    """Side of the KLT window, pixels, odd; smaller on small pictures. OpenCV's default."""
+    window: int = 11
+    """Side of the KLT window, pixels, odd. OpenCV's 21 drags background along within 10 px of a moving edge:
+    on the sample clips that doubles the points wrongly called moving."""
     max_return_error: float = 0.001
     """Greatest distance between a point and itself tracked forward and back, share of the diagonal: 0.7 px at
     640x360 (Kalal et al., Forward-Backward Error, ICPR 2010)."""
@@ -111,6 +112,9 @@ class ObjectsConfig:
     """Share of a window that a track must last to be segmented; shorter ones follow their neighbours."""
     least_shared: int = 3
     """Tracks that two windows' labels must share to be one object."""
+    least_windows: int = 2
+    """Windows that must find an object, where the clip has so many: parallax and slipping corners that look
+    like motion in one window seldom do so again in the next, which sees half of the same frames."""
     least_seconds: float = 0.5
     """What lives shorter is no object; its points go to the background."""
     fixed_spread: float = 0.9

@@ -93,7 +93,7 @@ def _common_motion(
     rows = np.flatnonzero((np.diff(ids) == 0) & (np.diff(frame) == 1) & (still | moving)[:-1])
     rows = rows[np.argsort(frame[rows], kind="stable")]
     step = xy[rows + 1] - xy[rows]
-    extent = np.array(trajectories.size) if trajectories.size else np.ptp(xy, axis=0) + 1.0
+    extent = np.asarray(trajectories.size or np.ptp(xy, axis=0).tolist(), dtype=np.float64) + 1
     cell = np.clip((xy[rows] / extent * _GRID).astype(int), 0, _GRID - 1) @ [1, _GRID]
     steps = max(trajectories.frames - 1, 0)
     common, length = np.zeros((steps, 2)), np.zeros(steps)
@@ -103,7 +103,7 @@ def _common_motion(
         goes = moving[rows[here]]
         seen = np.bincount(cell[here], minlength=_GRID**2)
         going = np.bincount(cell[here][goes], minlength=_GRID**2)
-        owned = np.count_nonzero(2 * going > seen) / max(np.count_nonzero(seen), 1)
+        owned = np.count_nonzero(2 * going > seen) / max(int(np.count_nonzero(seen)), 1)
         if goes.any() and owned >= config.fixed_world_share:
             common[f] = np.median(step[here][goes], axis=0)
             length[f] = np.median(np.linalg.norm(step[here][goes], axis=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -31,6 +32,7 @@ def label_clip(
     bounds = window_bounds(trajectories.frames, trajectories.fps, config)
     fixed = camera_fixed_tracks(trajectories, config)
     linker = Linker(config.least_shared)
+    seen_in: Counter[int] = Counter()
     labels = np.full(len(trajectories.ids), UNDECIDED, dtype=np.int32)
     unit = float(np.hypot(*trajectories.size)) / 800 if trajectories.size else 1.0
     halves = [(a[1] + b[0]) // 2 for a, b in pairwise(bounds)]
@@ -44,26 +46,27 @@ def label_clip(
             segmentation = segmenter.segment(tracks.select(lasting), motions)
             found = follow_neighbours(tracks, lasting, segmentation.labels, unit)
         found = linker.link(tracks.ids, found)
+        seen_in.update(int(number) for number in np.unique(found[found > BACKGROUND]))
         first, last = np.searchsorted(trajectories.frame, [edges[k], edges[k + 1]])
         ids = trajectories.ids[first:last]
         known = np.isin(ids, tracks.ids)
         labels[first:last][known] = found[np.searchsorted(tracks.ids, ids[known])]
         if progress:
             progress(k + 1, len(bounds))
-    return _settle(trajectories, labels, config)
+    confirmed = {n for n, windows in seen_in.items() if windows >= min(config.least_windows, len(bounds))}
+    return _settle(trajectories, labels, confirmed, config)
 
 
 def _settle(
-    trajectories: Trajectories, labels: NDArray[np.int32], config: ObjectsConfig
+    trajectories: Trajectories, labels: NDArray[np.int32], confirmed: set[int], config: ObjectsConfig
 ) -> NDArray[np.int32]:
-    """Send what lives too short to the background, and number the objects in the order in which they
-    appear."""
+    """Send what lives too short to the background; number the objects in the order in which they appear."""
     fps = trajectories.fps or 30.0
     numbers = []
-    for number in np.unique(labels[labels > BACKGROUND]):
+    for number in confirmed:
         frames = trajectories.frame[labels == number]
-        if (int(frames.max()) - int(frames.min()) + 1) / fps >= config.least_seconds:
-            numbers.append((int(frames.min()), int(number)))
+        if len(frames) and (int(frames.max()) - int(frames.min()) + 1) / fps >= config.least_seconds:
+            numbers.append((int(frames.min()), number))
     final = {number: k + 1 for k, (_, number) in enumerate(sorted(numbers))}
     table = np.arange(-1, int(labels.max(initial=0)) + 1)
     table[2:] = [final.get(int(number), BACKGROUND) for number in table[2:]]

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.types import UNDECIDED, Tracks
+from ifsvideo.types import BACKGROUND, UNDECIDED, Tracks
 
+_REACH = 20.0
+"""Distance over which a short track may take an object's label, pixels of a 640x480 picture."""
 _NEIGHBOURS = 8
 """Neighbours that are asked for the label of a short track."""
 
@@ -77,13 +79,20 @@ def _vote(
     near = there[np.atleast_1d(index)]
     both = tracks.visible[seen][:, near]
     offset = np.where(both[:, :, None], tracks.xy[seen][:, near] - tracks.xy[seen, p][:, None], np.nan)
-    # Spread of the offset between the two: rigid neighbours keep it.
-    with np.errstate(invalid="ignore"):
-        slip = np.linalg.norm(np.nanmax(offset, axis=0) - np.nanmin(offset, axis=0), axis=1)
-    slip = np.nan_to_num(slip / unit, nan=1e3)
-    reach = np.atleast_1d(distance) / unit
-    weight = np.exp(-slip / 2) / (10 + reach) * (both.sum(axis=0) >= 2)
-    if weight.sum() <= 1e-6:
+    shared = both.sum(axis=0) >= 2
+    if not shared.any():
+        return UNDECIDED
+    # Rigid neighbours keep their offset; perspective changes it in proportion to the way.
+    slip = np.full(len(near), np.inf)
+    slip[shared] = np.linalg.norm(
+        np.nanmax(offset[:, shared], axis=0) - np.nanmin(offset[:, shared], axis=0), axis=1
+    )
+    way = np.linalg.norm(np.ptp(tracks.xy[seen, p], axis=0))
+    excess = (slip - slip.min()) / (unit + 0.1 * way)
+    weight = np.exp(-excess) / (10 * unit + np.atleast_1d(distance))
+    # An object's label is not carried far: what lies there is seldom a part of it.
+    weight[(labels[near] > BACKGROUND) & (np.atleast_1d(distance) > _REACH * unit)] = 0.0
+    if not weight.any():
         return UNDECIDED
     candidates = np.unique(labels[near])
     support = [weight[labels[near] == c].sum() for c in candidates]

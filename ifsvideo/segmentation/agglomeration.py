@@ -140,8 +140,8 @@ class Agglomeration:
         first = a.reliable[:: 1 + len(a.reliable) // _MOST]
         second = b.reliable[:: 1 + len(b.reliable) // _MOST]
         distance = np.linalg.norm(self.anchor[first][:, None] - self.anchor[second][None], axis=2)
-        gap = float(distance.min()) / (config.gap * self.unit + max(a.spread, b.spread))
-        odds = -config.gap_slope * max(gap - 1, 0.0)
+        gap = float(distance.min()) / self.unit
+        odds = config.gap_slope * (1 - gap / config.gap)
         if odds < -10:
             return 0.0
         both = np.concatenate([first, second])

@@ -74,15 +74,15 @@ class SegmenterConfig:
     rigidity: float = 4.0
     """Distance from a common rigid motion at which two moving segments are as likely one as two, in units of
     the error that a static point is granted."""
-    rigidity_slope: float = 2.0
+    rigidity_slope: float = 1.0
     """Steepness of that decision."""
-    shear_slope: float = 2.0
+    shear_slope: float = 3.0
     """Weight of shear beside rigidity."""
-    gap: float = 30.0
-    """Distance at which two moving segments that move alike count as two things, pixels, beside their own
-    size."""
+    gap: float = 50.0
+    """Distance at which nearness stops to speak for one object, pixels; two pieces of one are nearer, two
+    things farther."""
     gap_slope: float = 3.0
-    """Steepness of that decision."""
+    """Log odds for one object of two moving segments that touch."""
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
 

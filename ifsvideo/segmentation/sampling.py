@@ -122,7 +122,7 @@ def _best_triple(
         np.broadcast_to(np.vstack([xy[base].T, np.ones(len(support))]), (len(triples), 3, len(support))),
     )
     moved = np.einsum("tcp,ftcx->tfpx", barycentric, xy[:, triples])
-    known = seen[None] & seen[:, triples].all(axis=2).T[:, :, None]
+    known = np.asarray(seen[None] & seen[:, triples].all(axis=2).T[:, :, None])
     known[:, base] = False  # the base frame maps to itself
     with np.errstate(invalid="ignore"):
         fits = known & (np.linalg.norm(moved - xy[None], axis=3) < config.inlier_error * unit)

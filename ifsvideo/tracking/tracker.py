@@ -22,7 +22,7 @@ SMALLEST = 16
 """Least side of a picture that is searched, pixels; smaller ones hold no window and have no points."""
 LARGEST = 2300.0
 """Greatest diagonal that is tracked in full resolution, pixels (1920x1080 is); larger pictures are halved.
-KLT's window stays 21 px, and what it sees of a 4K picture is then what it sees of a 1080-line one."""
+KLT's window stays the same, and what it sees of a 4K picture is then what it sees of a 1080-line one."""
 SUDDEN_LOSS = 0.3
 """Share of the tracks whose loss in one frame points to a jump of exposure (or a cut): worth a second try."""
 CUT = 0.2
