@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
+from scipy.spatial import Delaunay
 
 from ifsvideo.segmentation import trws
 from ifsvideo.segmentation.config import SegmenterConfig
@@ -19,15 +19,16 @@ def delaunay_edges(xy: NDArray[np.float64]) -> NDArray[np.int64]:
     """
     if len(xy) < 2:
         return np.empty((0, 2), dtype=np.int64)
-    try:
-        # QJ joggles, so that no point is dropped where several share a place.
-        simplices = Delaunay(xy, qhull_options="QJ Pp").simplices if len(xy) > 2 else None
-    except QhullError:
-        simplices = None
-    if simplices is None:
-        order = np.lexsort(xy.T)
+    centred = xy - xy.mean(axis=0)
+    _, (length, width), axes = np.linalg.svd(centred, full_matrices=False)
+    if width <= 1e-9 * max(length, 1.0):
+        # Joggled, they would have slivers that join the far ends.
+        order = np.argsort(centred @ axes[0], kind="stable")
         edges = np.stack([order[:-1], order[1:]], axis=1)
     else:
+        # QJ joggles, so that no point is dropped where several share a place; it needs four points.
+        triangle = np.array([[0, 1, 2]])
+        simplices = triangle if len(xy) == 3 else Delaunay(centred / length, qhull_options="QJ Pp").simplices
         edges = np.concatenate([simplices[:, [0, 1]], simplices[:, [1, 2]], simplices[:, [2, 0]]])
     return np.unique(np.sort(edges, axis=1), axis=0).astype(np.int64)
 
