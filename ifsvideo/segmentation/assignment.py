@@ -26,7 +26,7 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
     Returns
     -------
     (M, P) float
-        Root of the mean square distance per frame, pixels; infinite for a point seen in fewer than 3 frames,
+        Root of the mean square distance per frame, pixels; infinite for a point seen in fewer than 2 frames,
         which any model of rank 2 explains.
     """
     seen = np.repeat(tracks.visible, 2, axis=0).astype(np.float64)  # (2F, P)
@@ -40,11 +40,11 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
         D = (W - mean[:, None]) * seen
         # Normal equations of the projection on the visible rows, a 2x2 system for every point.
         uu = np.einsum("ra,rb,rp->pab", U, U, seen) + 1e-9 * np.eye(2)
-        ud = U.T @ D
-        a = np.linalg.solve(uu, ud.T[:, :, None])[:, :, 0]
-        square = (D**2).sum(axis=0) - (a * ud.T).sum(axis=1)
-        result[m] = np.sqrt(np.maximum(square, 0.0) / np.maximum(frames, 1))
-    result[:, frames < 3] = np.inf
+        a = np.linalg.solve(uu, (U.T @ D).T[:, :, None])[:, :, 0]
+        # Not |D|^2 - a U^T D: with trajectories of 1e4 px, 1e-9 on the diagonal would show in the difference.
+        square = ((D - U @ a.T * seen) ** 2).sum(axis=0)
+        result[m] = np.sqrt(square / np.maximum(frames, 1))
+    result[:, frames < 2] = np.inf
     return result
 
 
@@ -77,5 +77,6 @@ def assign(
     distance = np.linalg.norm(anchor[None, :, None] - models.controls[:, None], axis=3).min(axis=2)  # (M, P)
     cost = np.where(models.inliers | ~models.inliers.any(axis=0), residual, np.inf)
     rank = np.argsort(np.argsort(cost, axis=0, kind="stable"), axis=0)
-    allowed: Bools = (rank < nearest) & (np.isfinite(cost) | ~np.isfinite(cost).any(axis=0))
+    fits = np.isfinite(cost)
+    allowed: Bools = (fits & (rank < nearest)) | ~fits.any(axis=0)
     return np.asarray(np.argmin(np.where(allowed, distance, np.inf), axis=0), dtype=np.int64)
