@@ -1,0 +1,190 @@
+"""Bundle adjustment: derivatives against differences, and known cameras and depths found again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from ifsvideo.segmentation.bundle import Bundle, Estimate, rotation, skew
+from tests.scenes import FOCAL, SIZE, Camera, Mover, Scene, make_scene
+
+SIDE = float(max(SIZE))
+LENS = np.array([np.log(FOCAL / SIDE), 0.0])
+REFERENCE = 2
+
+
+def bundle_of(scene: Scene) -> Bundle:
+    observed = (scene.tracks.xy - (np.array(SIZE) - 1) / 2) / SIDE
+    points = scene.tracks.points
+    tolerance = np.full(points, 0.4 / SIDE)
+    spread = np.array([0.3, 0.15])
+    return Bundle(observed, scene.tracks.visible, np.ones(points), tolerance, REFERENCE, LENS, spread)
+
+
+def true_estimate(scene: Scene) -> Estimate:
+    """Truth in the reference camera's coordinates, the camera's distances of root mean square 1."""
+    camera, here = scene.camera, scene.camera.R[REFERENCE]
+    R = camera.R @ here.T
+    t = np.einsum("kij,kj->ki", camera.R, camera.centre[REFERENCE] - camera.centre)
+    q = (scene.world[REFERENCE] - camera.centre[REFERENCE]) @ here.T
+    scale = max(float(np.sqrt((t**2).sum() / (len(R) - 1))), 1e-12)
+    X = np.column_stack([q[:, :2] / q[:, 2:], scale / q[:, 2]])
+    return Estimate(R, t / scale, X, float(LENS[0]), float(LENS[1]))
+
+
+def disturbed(e: Estimate, seed: int = 0) -> Estimate:
+    rng = np.random.default_rng(seed)
+    R = rotation(rng.normal(0, 0.005, (len(e.R), 3))) @ e.R
+    t = e.t + rng.normal(0, 0.1, e.t.shape)
+    R[REFERENCE], t[REFERENCE] = np.eye(3), 0
+    X = e.X * rng.uniform([0.98, 0.98, 0.5], [1.02, 1.02, 1.5], e.X.shape)
+    return Estimate(R, t, X, e.log_focal + 0.1, 0.05)
+
+
+def turned_by(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angles between rotations, radians."""
+    return np.asarray(Rotation.from_matrix(a @ b.transpose(0, 2, 1)).magnitude())
+
+
+@pytest.fixture(scope="module")
+def aside() -> Scene:
+    return make_scene(Camera.path(frames=6, step=(0.5, 0.1, 0.3)), static=60, noise=0.0)
+
+
+def test_rotation_and_skew() -> None:
+    omega = np.random.default_rng(0).normal(0, 1, (5, 3))
+    assert_allclose(rotation(omega), Rotation.from_rotvec(omega).as_matrix(), atol=1e-12)
+    assert_allclose(rotation(np.zeros((1, 3)))[0], np.eye(3))
+    assert_allclose(skew(omega[0]) @ omega[1], np.cross(omega[0], omega[1]))
+
+
+def test_truth_projects_onto_what_was_observed(aside: Scene) -> None:
+    bundle = bundle_of(aside)
+    assert np.abs(bundle.residual(true_estimate(aside))).max() < 1e-12
+
+
+def test_derivatives_agree_with_differences(aside: Scene) -> None:
+    bundle, h = bundle_of(aside), 1e-6
+    e = replace(disturbed(true_estimate(aside)), k1=0.1)
+    by_camera, by_point, by_lens = bundle._derivatives(e, bundle.project(e))
+
+    def difference(plus: Estimate, minus: Estimate) -> np.ndarray:
+        return np.asarray((bundle.project(plus).u - bundle.project(minus).u) / (2 * h))
+
+    for axis in range(3):
+        nudge = h * np.eye(3)[axis]
+        turn = [replace(e, R=rotation(sign * nudge) @ e.R) for sign in (1, -1)]
+        move = [replace(e, t=e.t + sign * nudge) for sign in (1, -1)]
+        point = [replace(e, X=e.X + sign * nudge) for sign in (1, -1)]
+        assert_allclose(by_camera[..., axis], difference(turn[0], turn[1]), atol=1e-7)
+        assert_allclose(by_camera[..., 3 + axis], difference(move[0], move[1]), atol=1e-7)
+        assert_allclose(by_point[..., axis], difference(point[0], point[1]), atol=1e-7)
+    focal = [replace(e, log_focal=e.log_focal + sign * h) for sign in (1, -1)]
+    bend = [replace(e, k1=e.k1 + sign * h) for sign in (1, -1)]
+    assert_allclose(by_lens[..., 0], difference(focal[0], focal[1]), atol=1e-7)
+    assert_allclose(by_lens[..., 1], difference(bend[0], bend[1]), atol=1e-7)
+
+
+def test_unseen_observations_have_no_say(aside: Scene) -> None:
+    scene = aside.with_gaps(least=3)
+    bundle, e = bundle_of(scene), disturbed(true_estimate(aside))
+    hidden = ~scene.tracks.visible
+    assert hidden.any()
+    assert not bundle.residual(e)[hidden].any()
+    for derivative in bundle._derivatives(e, bundle.project(e)):
+        assert not derivative[hidden].any()
+
+
+def test_finds_known_cameras_and_depths_up_to_scale(aside: Scene) -> None:
+    truth, bundle = true_estimate(aside), bundle_of(aside)
+    found = bundle.solve(disturbed(truth), [8.0, 4.0, 2.0] + [1.0] * 25)
+    assert turned_by(found.R, truth.R).max() < 2e-3
+    assert_allclose(found.t, truth.t, atol=0.03)
+    assert_allclose(found.X[:, 2], truth.X[:, 2], rtol=0.1)
+    assert found.log_focal == pytest.approx(truth.log_focal, abs=0.05)
+    assert SIDE * bundle.rms(bundle.residual(found)).max() < 0.05
+
+
+def test_scale_stays_fixed_and_points_in_front(aside: Scene) -> None:
+    found = bundle_of(aside).solve(disturbed(true_estimate(aside)), [4.0, 1.0, 1.0])
+    assert np.sqrt((found.t**2).sum() / (len(found.t) - 1)) == pytest.approx(1)
+    assert (found.X[:, 2] >= 0).all()
+    assert_allclose(found.R[REFERENCE], np.eye(3))
+    assert not found.t[REFERENCE].any()
+
+
+def test_a_step_never_raises_the_cost(aside: Scene) -> None:
+    bundle, e = bundle_of(aside), disturbed(true_estimate(aside), seed=4)
+    costs = [bundle.cost(bundle.residual(e), 1.0)]
+    for steps in range(1, 8):
+        moved = bundle.solve(e, [1.0] * steps)
+        costs.append(bundle.cost(bundle.residual(moved), 1.0))
+    assert (np.diff(costs) <= 1e-9).all()
+    assert costs[-1] < 0.5 * costs[0]
+
+
+def test_points_alone_are_found_with_known_cameras(aside: Scene) -> None:
+    truth, bundle = true_estimate(aside), bundle_of(aside)
+    start = replace(truth, X=disturbed(truth).X)
+    found = bundle.solve_points(start, 15)
+    assert_allclose(found.X, truth.X, atol=1e-5)
+    assert_allclose(found.R, truth.R)
+
+
+def test_a_point_beyond_infinity_is_held_there() -> None:
+    """A point that contracts towards the way ahead would lie behind the camera: no inverse depth fits."""
+    camera = Camera.path(frames=6, step=(0, 0, 0.3), shake=0.0)
+    scene = make_scene(camera, (Mover((3.0, 1.0, 20.0), (0, 0, 1.0)),), static=40, noise=0.0)
+    bundle, truth = bundle_of(scene), true_estimate(scene)
+    found = bundle.solve_points(truth, 20)
+    car = scene.truth == 1
+    assert not found.X[car, 2].any()
+    assert SIDE * bundle.rms(bundle.residual(found))[car].min() > 0.4
+    assert SIDE * bundle.rms(bundle.residual(found))[~car].max() < 1e-6
+
+
+def test_a_camera_that_only_turns() -> None:
+    camera = Camera.path(frames=6, step=(0, 0, 0), turn=(0, 0.02, 0.005))
+    scene = make_scene(camera, static=60, noise=0.0)
+    truth, bundle = true_estimate(scene), bundle_of(scene)
+    start = replace(truth, R=np.repeat(np.eye(3)[None], 6, axis=0), t=np.zeros((6, 3)))
+    start = replace(start, X=start.X * [1, 1, 0])
+    found = bundle.solve(start, [32.0, 16.0, 8.0, 4.0, 2.0] + [1.0] * 10, translate=False)
+    assert turned_by(found.R, truth.R).max() < 1e-3
+    assert not found.t.any()
+    assert SIDE * bundle.rms(bundle.residual(found)).max() < 0.05
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_three_movers_in_ten_do_not_pull_the_cameras(seed: int) -> None:
+    scene = make_scene(Camera.path(frames=8, step=(0.5, 0.1, 0.3)), static=84, noise=0.1, seed=seed)
+    rng = np.random.default_rng(seed)
+    moving = np.arange(84) >= 58
+    velocity = rng.normal(0, 4.0, (26, 2))
+    xy = scene.tracks.xy.copy()
+    xy[:, moving] += np.arange(8)[:, None, None] * velocity
+    spoilt = replace(scene, tracks=replace(scene.tracks, xy=xy))
+    truth, bundle = true_estimate(scene), bundle_of(spoilt)
+    found = bundle.solve(disturbed(truth, seed), [16.0, 8.0, 8.0, 4.0, 4.0, 2.0, 2.0] + [1.0] * 20)
+    error = SIDE * bundle.rms(bundle.residual(found))
+    assert turned_by(found.R, truth.R).max() < 5e-3
+    assert np.quantile(error[~moving], 0.95) < 0.4
+    assert np.median(error[moving]) > 1.0
+
+
+def test_a_subset_is_the_same_window_with_fewer_points(aside: Scene) -> None:
+    bundle, e = bundle_of(aside), disturbed(true_estimate(aside))
+    some = np.array([3, 5, 40])
+    part = bundle.subset(some)
+    assert_allclose(part.residual(replace(e, X=e.X[some])), bundle.residual(e)[:, some])
+
+
+def test_sensitivity_is_the_shift_a_unit_of_inverse_depth_makes(aside: Scene) -> None:
+    bundle, e, h = bundle_of(aside), true_estimate(aside), 1e-6
+    shift = bundle.project(replace(e, X=e.X + np.array([0, 0, h]))).u - bundle.project(e).u
+    expected = np.sqrt((shift**2).sum(axis=2).mean(axis=0)) / h
+    assert_allclose(bundle.depth_sensitivity(e), expected, rtol=1e-4)

@@ -1,0 +1,143 @@
+"""The static world of a window: whom it explains, whom it does not, and when it says nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.world import fit_world, static_evidence
+from ifsvideo.types import Tracks
+from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, Mover, Scene, make_scene
+
+FORWARD = Camera.path(step=(0, 0, 0.3))
+
+
+def evidence_of(scene: Scene) -> np.ndarray:
+    threshold = SegmenterConfig().evidence_threshold
+    evidence, tolerance, world = static_evidence(scene.tracks, SIZE, threshold, np.random.default_rng(0))
+    assert world is not None
+    assert evidence.shape == tolerance.shape == (scene.tracks.points,)
+    assert (tolerance > 0).all()
+    return evidence
+
+
+CAMERAS = {
+    "ahead": FORWARD,
+    "aside": Camera.path(step=(0.2, 0, 0)),
+    "turning": Camera.path(step=(0.05, 0, 0.25), turn=(0, 0.005, 0)),
+    "only turning": Camera.path(step=(0, 0, 0), turn=(0, 0.005, 0)),
+    "standing": Camera.path(step=(0, 0, 0), shake=0.0),
+}
+
+
+@pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS.keys())
+@pytest.mark.parametrize("gaps", [False, True])
+def test_a_rigid_scene_has_no_movers(camera: Camera, gaps: bool) -> None:
+    scene = make_scene(camera, depth=(8.0, 80.0))  # near to far as 1 to 10
+    if gaps:
+        scene = scene.with_gaps()
+    assert (evidence_of(scene) < 1).mean() >= 0.97
+
+
+@pytest.mark.parametrize("name", ["ahead", "aside", "turning"])
+def test_movers_do_not_fit_into_it(name: str) -> None:
+    scene = make_scene(CAMERAS[name], (LEFT_CAR, RIGHT_CAR), seed=1)
+    evidence = evidence_of(scene)
+    assert (evidence[scene.truth == 0] < 1).mean() >= 0.97
+    for car in (1, 2):
+        assert (evidence[scene.truth == car] > 1).mean() > 0.9
+
+
+def test_movers_in_broken_tracks() -> None:
+    scene = make_scene(FORWARD, (LEFT_CAR,)).with_gaps(least=10)
+    evidence = evidence_of(scene)
+    assert (evidence[scene.truth == 0] < 1).mean() >= 0.97
+    assert (evidence[scene.truth == 1] > 1).mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("velocity", "acceleration"),
+    [((0, 0, 0.45), (0, 0, 0)), ((0, 0, 0.3), (0, 0, 0.03))],
+    ids=["gap opens", "gap closes, then opens"],
+)
+def test_a_car_followed_at_a_changing_distance(velocity: tuple, acceleration: tuple) -> None:
+    """It moves in parallel with the camera, so every fundamental matrix holds it for static."""
+    car = Mover((0.5, 0.5, 12.0), velocity, acceleration, extent=(3.0, 2.0, 3.0))
+    scene = make_scene(FORWARD, (car,))
+    evidence = evidence_of(scene)
+    assert (evidence[scene.truth == 0] < 1).mean() >= 0.97
+    assert (evidence[scene.truth == 1] > 1).mean() > 0.7
+
+
+def test_depths_are_found_up_to_scale() -> None:
+    scene = make_scene(FORWARD, noise=0.05)
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    assert world is not None
+    middle = world.frames[world.reference]
+    depth = (scene.world[middle] - scene.camera.centre[middle]) @ scene.camera.R[middle][2]
+    sure = world.sensitivity * world.estimate.X[:, 2] > 10  # moves ten pixels by its depth alone
+    assert sure.sum() > 30
+    product = world.estimate.X[sure, 2] * depth[sure]
+    assert np.std(product) < 0.05 * np.mean(product)
+
+
+def test_more_noise_is_granted_to_all() -> None:
+    """Footage that fits worse everywhere is usual for the window, not a picture full of movers."""
+    assert (evidence_of(make_scene(FORWARD, noise=0.6)) < 1).mean() >= 0.97
+
+
+def test_the_size_of_the_picture_does_not_matter() -> None:
+    scene = make_scene(FORWARD, (LEFT_CAR,))
+    large = Tracks.from_array(scene.tracks.xy * 3 + 1)
+    threshold = SegmenterConfig().evidence_threshold
+    small, tolerance, _ = static_evidence(scene.tracks, SIZE, threshold, np.random.default_rng(0))
+    other, wider, _ = static_evidence(large, (1920, 1440), threshold, np.random.default_rng(0))
+    assert wider == pytest.approx(3 * tolerance, rel=1e-3)
+    assert ((small > 1) == (other > 1)).mean() > 0.98
+
+
+def test_too_few_points_say_nothing() -> None:
+    scene = make_scene(static=7)
+    assert fit_world(scene.tracks, SIZE, np.random.default_rng(0)) is None
+    evidence, tolerance, world = static_evidence(scene.tracks, SIZE, 5.0, np.random.default_rng(0))
+    assert world is None
+    assert not evidence.any()
+    assert (tolerance > 0).all()
+
+
+def test_points_that_share_no_frames_say_nothing() -> None:
+    xy = np.full((20, 40, 2), np.nan)
+    xy[np.arange(40) % 20, np.arange(40)] = 100.0
+    assert fit_world(Tracks.from_array(xy), SIZE, np.random.default_rng(0)) is None
+
+
+def test_a_point_without_two_key_frames_has_no_evidence() -> None:
+    xy = make_scene(FORWARD).tracks.xy.copy()
+    xy[:-1, 0] = np.nan
+    xy[:, 1] = np.nan
+    world = fit_world(Tracks.from_array(xy), SIZE, np.random.default_rng(0))
+    assert world is not None
+    assert np.isnan(world.rms[:2]).all()
+    assert np.isfinite(world.rms[2:]).all()
+    evidence, _, _ = static_evidence(Tracks.from_array(xy), SIZE, 5.0, np.random.default_rng(0))
+    assert not evidence[:2].any()
+    assert np.isfinite(evidence).all()
+
+
+@pytest.mark.parametrize("frames", [2, 3, 5])
+def test_few_frames(frames: int) -> None:
+    scene = make_scene(Camera.path(frames=frames, step=(0, 0, 0.5)))
+    assert (evidence_of(scene) < 1).mean() >= 0.97
+
+
+@pytest.mark.parametrize("value", [0.0, 100.0])
+def test_points_that_all_share_a_place(value: float) -> None:
+    tracks = Tracks.from_array(np.full((10, 20, 2), value))
+    evidence, _, _ = static_evidence(tracks, SIZE, 5.0, np.random.default_rng(0))
+    assert (evidence < 1).all()
+
+
+def test_same_seed_same_evidence() -> None:
+    scene = make_scene(FORWARD, (LEFT_CAR,))
+    assert np.array_equal(evidence_of(scene), evidence_of(scene))
