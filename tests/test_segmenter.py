@@ -1,0 +1,204 @@
+"""The segmenter as a whole: how many motions, odd input, and the same labels for the same seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ifsvideo.errors import UsageError
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.segmenter import IFSSegmenter
+from ifsvideo.types import Tracks
+from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, Mover, Scene, make_scene, share_wrong
+
+THESIS = SegmenterConfig.thesis()
+BOTH = pytest.mark.parametrize("config", [SegmenterConfig(), THESIS], ids=["default", "thesis"])
+CARS = {1: (), 2: (LEFT_CAR,), 3: (LEFT_CAR, RIGHT_CAR)}
+
+
+@pytest.mark.parametrize("broken", [False, True], ids=["complete", "broken"])
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_number_of_motions_is_found(count: int, seed: int, broken: bool) -> None:
+    scene = make_scene(movers=CARS[count], seed=seed)
+    if broken:
+        scene = scene.with_gaps(seed)
+    result = IFSSegmenter(seed=seed).segment(scene.tracks)
+    assert np.unique(result.labels).tolist() == list(range(count))
+    assert share_wrong(result.labels, scene.truth) < 0.05
+    assert (result.labels[scene.truth == 0] == 0).mean() > 0.95
+
+
+@pytest.mark.parametrize("step", [(0.2, 0, 0), (0.1, 0.05, 0.2), (0, 0, 0.8)], ids=["aside", "aslant", "fast"])
+def test_a_deep_rigid_scene_is_one_motion(step: tuple[float, float, float]) -> None:
+    scene = make_scene(Camera.path(step=step), depth=(10, 100), static=150)
+    assert not IFSSegmenter().segment(scene.tracks).labels.any()
+
+
+@pytest.mark.parametrize("motions", [1, 2, 3, 4])
+def test_a_known_number_of_motions_is_kept(motions: int) -> None:
+    scene = make_scene(movers=CARS[3])
+    labels = IFSSegmenter().segment(scene.tracks, motions).labels
+    assert np.unique(labels).tolist() == list(range(motions))
+    if motions == 3:
+        assert share_wrong(labels, scene.truth) < 0.05
+
+
+@BOTH
+@pytest.mark.parametrize("motions", [0, -1])
+def test_fewer_than_one_motion_is_refused(config: SegmenterConfig, motions: int) -> None:
+    with pytest.raises(ValueError, match="at least 1"):
+        IFSSegmenter(config).segment(make_scene(static=20).tracks, motions)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_thesis_parts_two_strong_motions(seed: int) -> None:
+    """A distant flat world and a car across it: no depth for the plain measure to stumble over."""
+    car = Mover(centre=(-3.0, 0.0, 20.0), velocity=(0.3, 0.0, 0.0), points=40)
+    scene = make_scene(Camera.path(step=(0, 0, 0.1)), (car,), depth=(40, 60), noise=0.05, seed=seed)
+    labels = IFSSegmenter(THESIS, seed).segment(scene.tracks).labels
+    share = [np.bincount(labels[scene.truth == k]).max() for k in (0, 1)]
+    of = [np.bincount(labels[scene.truth == k]).argmax() for k in (0, 1)]
+    assert of[0] == 0
+    assert of[1] != 0
+    assert share[0] > 150
+    assert share[1] > 30
+
+
+@BOTH
+def test_same_seed_same_labels(config: SegmenterConfig) -> None:
+    tracks = make_scene(movers=CARS[3]).with_gaps().tracks
+    one, other = (IFSSegmenter(config, 5).segment(tracks) for _ in range(2))
+    for name in ("labels", "background", "segments", "confidence"):
+        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
+
+
+def test_the_order_of_points_matters_little() -> None:
+    scene = make_scene(movers=CARS[3])
+    order = np.random.default_rng(0).permutation(scene.tracks.points)
+    labels = IFSSegmenter().segment(scene.tracks).labels
+    shuffled = IFSSegmenter().segment(scene.tracks.select(order)).labels
+    assert share_wrong(shuffled, labels[order]) < 0.05
+
+
+@BOTH
+def test_what_every_stage_found_is_kept(config: SegmenterConfig) -> None:
+    scene = make_scene(movers=CARS[2])
+    tracks = scene.tracks
+    result = IFSSegmenter(config).segment(tracks)
+    assert result.background[scene.truth == 0].mean() > 0.9
+    assert result.background[scene.truth == 1].mean() < 0.3
+    names = np.unique(result.segments)
+    assert names.tolist() == list(range(len(names)))
+    assert len(names) >= len(np.unique(result.labels))
+    assert ((result.confidence >= 0) & (result.confidence <= 1)).all()
+    assert result.details["solution"].lower_bound <= result.details["solution"].energy
+
+
+def moved(xy: Any) -> Tracks:
+    return Tracks.from_array(xy)
+
+
+def odd_inputs() -> dict[str, Tracks]:
+    rng = np.random.default_rng(0)
+    scene = make_scene(static=60).tracks
+    seldom = scene.xy.copy()
+    seldom[:, 5] = np.nan
+    seldom[1:, 6] = np.nan
+    sparse = np.where(rng.random((20, 60, 1)) < 0.15, scene.xy, np.nan)
+    line = np.linspace(0, 100, 30)[None, :, None] * [1.0, 0.5] + np.arange(10)[:, None, None]
+    return {
+        "no frames": moved(np.empty((0, 12, 2))),
+        "no points": moved(np.empty((12, 0, 2))),
+        "nothing": moved(np.empty((0, 0, 2))),
+        "one frame": moved(scene.xy[:1]),
+        "two frames": moved(scene.xy[:2]),
+        "three frames": moved(scene.xy[:3]),
+        "one point": moved(scene.xy[:, :1]),
+        "two points": moved(scene.xy[:, :2]),
+        "three points": moved(scene.xy[:, :3]),
+        "nine points": moved(scene.xy[:, :9]),
+        "coincident": moved(np.full((10, 30, 2), 100.0)),
+        "coincident in the corner": moved(np.zeros((10, 30, 2))),
+        "coincident and going": moved(np.repeat(np.arange(10.0)[:, None, None], 30, axis=1) * [3.0, 2.0]),
+        "on a line": moved(line),
+        "never seen": moved(np.full((10, 20, 2), np.nan)),
+        "some seldom seen": moved(seldom),
+        "hardly ever seen": moved(sparse),
+        "first half and second half": moved(
+            np.concatenate(
+                [
+                    np.where(np.arange(20)[:, None, None] < 10, scene.xy, np.nan),
+                    np.where(np.arange(20)[:, None, None] >= 10, scene.xy, np.nan),
+                ],
+                axis=1,
+            )
+        ),
+        "wild": moved(rng.uniform(0, 480, (15, 50, 2))),
+        "far out": moved(scene.xy * 1e4 - 1e6),
+        "left of the picture": moved(scene.xy - 2000),
+        "tiny": moved(scene.xy * 1e-3),
+    }
+
+
+@BOTH
+@pytest.mark.parametrize("motions", [None, 2])
+@pytest.mark.parametrize("name", odd_inputs())
+def test_odd_input_neither_fails_nor_warns(name: str, motions: int | None, config: SegmenterConfig) -> None:
+    tracks = odd_inputs()[name]
+    result = IFSSegmenter(config).segment(tracks, motions)
+    assert result.labels.shape == (tracks.points,)
+    assert result.labels.dtype == np.int64
+    undecided = tracks.visible.sum(axis=0) < 2
+    assert (result.labels[undecided] == -1).all()
+    assert (result.labels[~undecided] >= 0).all()
+    assert np.isfinite(result.confidence).all()
+
+
+def test_a_standing_picture_is_background() -> None:
+    still = np.repeat(make_scene().tracks.xy[:1], 15, axis=0)
+    assert not IFSSegmenter().segment(Tracks.from_array(still, size=SIZE)).labels.any()
+
+
+def test_two_frames_tell_a_car_from_the_world() -> None:
+    """The frame count is no special case: two frames with enough motion between them are a window too."""
+    whole = make_scene(Camera.path(step=(0.05, 0, 0.3)), (LEFT_CAR, RIGHT_CAR), noise=0.05)
+    tracks = Tracks.from_array(whole.tracks.xy[[0, -1]], size=SIZE)
+    segments = IFSSegmenter().segment(tracks).segments
+    assert purity(segments, whole) > 0.95
+
+
+def purity(segments: np.ndarray, scene: Scene) -> float:
+    """Share of points whose segment is mostly of their own motion."""
+    right = [np.bincount(scene.truth[segments == s]).max() for s in np.unique(segments)]
+    return float(sum(right) / len(segments))
+
+
+@BOTH
+def test_the_over_segmentation_keeps_motions_apart(config: SegmenterConfig) -> None:
+    scene = make_scene(movers=CARS[3])
+    segments = IFSSegmenter(config).segment(scene.tracks).segments
+    assert len(np.unique(segments)) >= 3
+    assert purity(segments, scene) > 0.95
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("split", "magic"),
+        ("merging", ""),
+        ("models", 0),
+        ("pairs", 0),
+        ("disk_radius", -1.0),
+        ("inlier_error", float("nan")),
+        ("motion_sigma", float("inf")),
+        ("foreground_share", 1.5),
+        ("shear_ratio", -3.0),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(name: str, value: Any) -> None:
+    with pytest.raises(UsageError, match=rf"segmentation\.{name}"):
+        replace(SegmenterConfig(), **{name: value})
