@@ -32,7 +32,9 @@ def test_the_number_of_motions_is_found(count: int, seed: int, broken: bool) -> 
     assert (result.labels[scene.truth == 0] == 0).mean() > 0.95
 
 
-@pytest.mark.parametrize("step", [(0.2, 0, 0), (0.1, 0.05, 0.2), (0, 0, 0.8)], ids=["aside", "aslant", "fast"])
+@pytest.mark.parametrize(
+    "step", [(0.2, 0, 0), (0.1, 0.05, 0.2), (0, 0, 0.8)], ids=["aside", "aslant", "fast"]
+)
 def test_a_deep_rigid_scene_is_one_motion(step: tuple[float, float, float]) -> None:
     scene = make_scene(Camera.path(step=step), depth=(10, 100), static=150)
     assert not IFSSegmenter().segment(scene.tracks).labels.any()

@@ -1,0 +1,163 @@
+"""A whole clip: one number an object, fixed points undecided for life, false objects sent home."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from ifsvideo.config import ObjectsConfig
+from ifsvideo.objects.labelling import label_clip
+from ifsvideo.segmentation.segmenter import IFSSegmenter
+from ifsvideo.tracking.trajectories import Trajectories
+from ifsvideo.types import Segmentation, Tracks
+from tests.scenes import SIZE, Camera, Mover, Scene, make_scene
+
+CONFIG = ObjectsConfig()
+FPS = 30.0
+
+
+@dataclass
+class Told:
+    """A segmenter that is told the label of each track, by its id and the number of the window."""
+
+    label: Callable[[np.ndarray, int], np.ndarray]
+    windows: int = 0
+
+    def segment(self, tracks: Tracks, motions: int | None = None) -> Segmentation:
+        labels = np.asarray(self.label(tracks.ids, self.windows), dtype=np.int64)
+        self.windows += 1
+        nothing = np.zeros(len(labels))
+        return Segmentation(labels, labels == 0, labels, nothing)
+
+
+def clip_of(scene: Scene) -> Trajectories:
+    return replace(Trajectories.from_tracks(scene.tracks), size=SIZE, fps=FPS)
+
+
+def standing_crowd(frames: int = 120, tracks: int = 60) -> Trajectories:
+    xy = np.random.default_rng(0).uniform(0, SIZE, (tracks, 2)) + np.zeros((frames, 1, 1))
+    return replace(Trajectories.from_tracks(Tracks.from_array(xy)), size=SIZE, fps=FPS)
+
+
+def numbers_of(trajectories: Trajectories, labels: np.ndarray, ids: np.ndarray) -> list[int]:
+    return np.unique(labels[np.isin(trajectories.ids, ids)]).tolist()
+
+
+def test_a_moving_object_has_one_number_for_the_whole_clip() -> None:
+    """Tracks live a third of the clip, and so does none of the first window's in the last."""
+    camera = Camera.path(frames=75, step=(0, 0, 0.1))
+    car = Mover((-1.0, 0.5, 15.0), (0.08, 0.0, 0.1), points=80)
+    scene = make_scene(camera, (car,), static=250)
+    rng = np.random.default_rng(0)
+    birth = rng.integers(-20, 60, scene.tracks.points)
+    time = np.arange(75)[:, None]
+    alive = (time >= birth) & (time < birth + 35)
+    clip = clip_of(replace(scene, tracks=Tracks.from_array(scene.tracks.xy, alive)))
+    labels = label_clip(clip, IFSSegmenter(), CONFIG)
+    truth = scene.truth[clip.ids]
+    assert set(np.unique(labels)) <= {-1, 0, 1}
+    assert (labels[truth == 1] == 1).mean() > 0.9
+    assert (labels[truth == 0] == 0).mean() > 0.95
+    assert labels.shape == clip.ids.shape
+    assert labels.dtype == np.int32
+
+
+def test_points_fixed_to_the_camera_are_undecided_for_life() -> None:
+    scene = make_scene(Camera.path(frames=70, step=(0, 0, 0.1), shake=0.02))
+    rng = np.random.default_rng(0)
+    logo = rng.uniform((20, 400), (200, 470), (10, 2)) + rng.normal(0, 0.05, (70, 10, 2))
+    both = Tracks.from_array(np.concatenate([scene.tracks.xy, logo], axis=1))
+    clip = clip_of(replace(scene, tracks=both))
+    labels = label_clip(clip, Told(lambda ids, _: np.zeros(len(ids))), CONFIG)
+    assert numbers_of(clip, labels, np.arange(200, 210)) == [-1]
+    assert numbers_of(clip, labels, np.arange(200)) == [0]
+
+
+def test_before_a_standing_camera_all_is_background() -> None:
+    clip = standing_crowd()
+    assert not label_clip(clip, IFSSegmenter(), CONFIG).any()
+
+
+def test_a_short_lived_object_goes_to_the_background() -> None:
+    """One window's fancy is no object; one that stays is."""
+    clip = standing_crowd(frames=150)
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        return np.where(ids < 10, 1, np.where((ids < 20) & (window == 3), 2, 0))
+
+    segmenter = Told(label)
+    labels = label_clip(clip, segmenter, replace(CONFIG, least_windows=2))
+    assert segmenter.windows > 5
+    assert numbers_of(clip, labels, np.arange(10)) == [1]
+    assert numbers_of(clip, labels, np.arange(10, 60)) == [0]
+
+
+def test_an_object_that_lives_too_short_a_time_goes_too() -> None:
+    clip = standing_crowd(frames=150)
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        return np.where((ids < 20) & (window in (3, 4)), 1, 0)
+
+    long, short = (
+        label_clip(clip, Told(label), replace(CONFIG, least_windows=1, least_seconds=s)) for s in (0.1, 4.0)
+    )
+    assert numbers_of(clip, long, np.arange(20)) == [0, 1]
+    assert not short.any()
+
+
+def test_numbers_follow_the_order_of_appearance_without_gaps() -> None:
+    clip = standing_crowd(frames=200)
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        late = np.where((ids < 30) & (window >= 4), 1, 0)
+        passing = np.where((ids >= 50) & (window == 2), 3, 0)
+        return np.where((ids >= 30) & (ids < 40), 2, late + passing)
+
+    labels = label_clip(clip, Told(label), CONFIG)
+    assert numbers_of(clip, labels, np.arange(30, 40)) == [1]
+    assert numbers_of(clip, labels, np.arange(30)) == [0, 2]
+    assert np.unique(labels).tolist() == [0, 1, 2]
+
+
+def test_each_frame_takes_the_label_of_the_window_whose_centre_is_nearest() -> None:
+    clip = standing_crowd(frames=90)
+    labels = label_clip(clip, Told(lambda ids, window: np.full(len(ids), window % 2)), CONFIG)
+    changes = np.flatnonzero(np.diff([labels[clip.frame == f][0] for f in range(90)])) + 1
+    starts = np.arange(0, 61, CONFIG.window_frames // 2)
+    centres = starts + CONFIG.window_frames / 2
+    assert changes.tolist() == pytest.approx(((centres[1:] + centres[:-1]) / 2).tolist(), abs=1)
+
+
+def test_short_tracks_follow_their_neighbours() -> None:
+    clip = standing_crowd(frames=60)
+    brief = (clip.ids != 0) | (clip.frame < 6)
+    clip = replace(clip, frame=clip.frame[brief], ids=clip.ids[brief], xy=clip.xy[brief])
+
+    def label(ids: np.ndarray, _: int) -> np.ndarray:
+        assert 0 not in ids
+        return np.zeros(len(ids))
+
+    labels = label_clip(clip, Told(label), CONFIG)
+    assert numbers_of(clip, labels, np.array([0])) == [0]
+
+
+def test_a_clip_without_points_or_frames() -> None:
+    for frames in (0, 50):
+        clip = Trajectories(
+            np.empty(0, np.int32), np.empty(0, np.int64), np.empty((0, 2), np.float32), frames, SIZE, FPS
+        )
+        assert label_clip(clip, IFSSegmenter(), CONFIG).shape == (0,)
+
+
+def test_a_clip_of_one_frame_is_undecided() -> None:
+    assert (label_clip(standing_crowd(frames=1), IFSSegmenter(), CONFIG) == -1).all()
+
+
+def test_progress_counts_the_windows() -> None:
+    steps: list[tuple[int, int]] = []
+    segmenter = Told(lambda ids, _: np.zeros(len(ids)))
+    label_clip(standing_crowd(), segmenter, CONFIG, progress=lambda done, total: steps.append((done, total)))
+    assert steps == [(k + 1, segmenter.windows) for k in range(segmenter.windows)]

@@ -1,0 +1,101 @@
+"""Labels of windows become numbers that objects keep."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ifsvideo.objects.linking import Linker
+
+
+def link(linker: Linker, labels: dict[range, int]) -> dict[range, set[int]]:
+    """Link one window given as label of each range of ids; the numbers of each range."""
+    ids = np.array([i for block in labels for i in block], dtype=np.int64)
+    own = np.array([label for block, label in labels.items() for _ in block], dtype=np.int64)
+    number = dict(zip(ids.tolist(), linker.link(ids, own).tolist(), strict=True))
+    return {block: {number[i] for i in block} for block in labels}
+
+
+A, B, C = range(10), range(10, 20), range(20, 30)
+
+
+def test_objects_keep_their_numbers_when_windows_name_them_otherwise() -> None:
+    linker = Linker(3)
+    assert link(linker, {A: 1, B: 2, C: 0}) == {A: {1}, B: {2}, C: {0}}
+    assert link(linker, {A: 2, B: 1, C: 0}) == {A: {1}, B: {2}, C: {0}}
+    assert link(linker, {A: 7, B: 4}) == {A: {1}, B: {2}}
+
+
+def test_number_passes_on_from_track_to_track() -> None:
+    """After three windows not one track of the first is left."""
+    linker = Linker(3)
+    link(linker, {range(10): 1})
+    for start in (5, 10, 15, 20):
+        block = range(start, start + 10)
+        assert link(linker, {block: 3}) == {block: {1}}
+
+
+def test_too_few_shared_tracks_make_a_new_object() -> None:
+    linker = Linker(3)
+    link(linker, {A: 1})
+    assert link(linker, {range(8, 18): 1}) == {range(8, 18): {2}}
+    linker = Linker(3)
+    link(linker, {A: 1})
+    assert link(linker, {range(7, 17): 1}) == {range(7, 17): {1}}
+
+
+def test_of_a_split_the_larger_part_keeps_the_number() -> None:
+    linker = Linker(3)
+    link(linker, {A: 1})
+    small, large = range(4), range(4, 10)
+    assert link(linker, {small: 1, large: 2}) == {small: {2}, large: {1}}
+
+
+def test_of_a_merger_the_larger_parts_number_stays() -> None:
+    linker = Linker(3)
+    few = range(4)
+    link(linker, {few: 1, B: 2})
+    both = range(20)
+    assert link(linker, {both: 1}) == {both: {2}}
+
+
+def test_most_tracks_in_all_keep_their_number() -> None:
+    """One to one: the greedy choice for the first label would cost the second its only partner."""
+    linker = Linker(3)
+    link(linker, {range(9): 1, range(9, 17): 2})
+    # The first label shares 5 with 1 and 4 with 2, the second 4 with 1 and none with 2.
+    one = [*range(5), *range(9, 13)]
+    ids = np.array([*one, 5, 6, 7, 8], dtype=np.int64)
+    found = linker.link(ids, np.repeat([1, 2], [9, 4]))
+    assert found.tolist() == [2] * 9 + [1] * 4
+
+
+def test_a_number_is_never_used_again() -> None:
+    linker = Linker(3)
+    seen: set[int] = set()
+    for window in range(5):
+        block = range(100 * window, 100 * window + 10)
+        (number,) = link(linker, {block: 1})[block]
+        assert number not in seen
+        seen.add(number)
+
+
+def test_an_object_that_rests_for_a_window_is_known_again() -> None:
+    linker = Linker(3)
+    link(linker, {A: 1})
+    assert link(linker, {A: 0}) == {A: {0}}
+    assert link(linker, {A: 1, B: 2}) == {A: {1}, B: {2}}
+
+
+def test_background_and_no_decision_stay() -> None:
+    linker = Linker(1)
+    assert link(linker, {A: 0, B: -1}) == {A: {0}, B: {-1}}
+    assert link(linker, {A: -1, B: 0}) == {A: {-1}, B: {0}}
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_an_empty_window(before: bool) -> None:
+    linker = Linker(3)
+    if before:
+        link(linker, {A: 1})
+    assert linker.link(np.empty(0, np.int64), np.empty(0, np.int64)).shape == (0,)
