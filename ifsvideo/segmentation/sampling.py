@@ -87,7 +87,7 @@ def sample_models(
             controls.append(tracks.xy[base, best[1]])
             foreground.append(fg)
     return AffineModels(
-        np.array(inliers, dtype=bool).reshape(-1, tracks.points),
+        np.array(inliers, dtype=bool).reshape(len(inliers), tracks.points),
         np.array(controls, dtype=np.float64).reshape(-1, 3, 2),
         np.array(foreground, dtype=bool),
     )
@@ -122,8 +122,8 @@ def _best_triple(
         np.broadcast_to(np.vstack([xy[base].T, np.ones(len(support))]), (len(triples), 3, len(support))),
     )
     moved = np.einsum("tcp,ftcx->tfpx", barycentric, xy[:, triples])
-    known = np.asarray(seen[None] & seen[:, triples].all(axis=2).T[:, :, None])
-    known[:, base] = False  # the base frame maps to itself
+    known = np.logical_and(seen[None], seen[:, triples].all(axis=2).T[:, :, None])
+    known[:, base, :] = False  # the base frame maps to itself
     with np.errstate(invalid="ignore"):
         fits = known & (np.linalg.norm(moved - xy[None], axis=3) < config.inlier_error * unit)
     counted = known.sum(axis=1)

@@ -36,7 +36,16 @@ def build() -> Scene:
         return pose((x, -1.32 + heave(t) - bump(t, 1.15, 0.02), z), yaw, pitch, shake[2](t))
 
     def oncoming(t: float) -> Array:
-        return course.at(65.0 - 8.0 * t, LANES[0] - 0.15 + 0.2 * np.sin(1.1 * t), np.pi)
+        # From 12 m/s down to 3, swinging out; a steady car on a bend could pass for a nearer parked one.
+        braking = np.clip(t - 0.3, 0.0, 1.4)
+        z = 50.0 - 12.0 * t + 9.0 / 2.8 * braking**2 + 9.0 * max(t - 1.7, 0.0)
+        step = 0.02
+        before, now, after = (
+            smoothstep(t + dt, 0.3, 1.3) - smoothstep(t + dt, 1.5, 2.5) for dt in (-step, 0.0, step)
+        )
+        swing = 1.3
+        steer = (after - before) * swing / (2 * step) / 8.0
+        return course.at(z, LANES[0] - 0.15 + swing * now, np.pi - float(np.arctan(steer)))
 
     def overtaking(t: float) -> Array:
         since = t - 1.3
