@@ -40,13 +40,23 @@ def test_a_rigid_scene_has_no_movers(camera: Camera, gaps: bool) -> None:
     assert (evidence_of(scene) < 1).mean() >= 0.97
 
 
-@pytest.mark.parametrize("name", ["ahead", "aside", "turning"])
+@pytest.mark.parametrize("name", CAMERAS)
 def test_movers_do_not_fit_into_it(name: str) -> None:
     scene = make_scene(CAMERAS[name], (LEFT_CAR, RIGHT_CAR), seed=1)
     evidence = evidence_of(scene)
     assert (evidence[scene.truth == 0] < 1).mean() >= 0.97
     for car in (1, 2):
         assert (evidence[scene.truth == car] > 1).mean() > 0.9
+
+
+@pytest.mark.parametrize("name", ["standing", "only turning"])
+@pytest.mark.parametrize("car", [LEFT_CAR, RIGHT_CAR], ids=["left", "right"])
+def test_one_car_before_a_camera_that_stays_is_no_parallax(name: str, car: Mover) -> None:
+    """A camera that passes the car while all else is far away would fit as well."""
+    scene = make_scene(CAMERAS[name], (car,))
+    evidence = evidence_of(scene)
+    assert (evidence[scene.truth == 0] < 1).mean() >= 0.97
+    assert (evidence[scene.truth == 1] > 1).mean() > 0.9
 
 
 def test_movers_in_broken_tracks() -> None:
