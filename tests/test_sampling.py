@@ -68,6 +68,19 @@ def test_inliers_are_those_of_equation_3_2(seed: int) -> None:
     assert partial < len(models)  # disks do leave points out
 
 
+@pytest.mark.parametrize(("stays", "held"), [(4, False), (5, True), (6, True)])
+def test_half_of_the_frames_make_an_inlier(stays: int, held: bool) -> None:
+    """Of ten frames after the first, a point follows for some and then leaves."""
+    first = np.random.default_rng(0).uniform(100, 120, (12, 2))  # every disk holds them all
+    xy = affine_tracks(first, some_maps(11)).xy.copy()
+    xy[1 + stays :, 0] += 500.0
+    models = sample(Tracks.from_array(xy), np.ones(12, bool))
+    others = (models.controls != xy[0, 0]).any(axis=2).all(axis=1)
+    assert others.any()
+    assert (models.inliers[others, 0] == held).all()
+    assert models.inliers[others, 1:].all()
+
+
 def test_outliers_within_a_disk_are_left_out() -> None:
     moved = affine_tracks(grid(), some_maps(FRAMES))
     xy = moved.xy.copy()

@@ -122,7 +122,8 @@ def _best_triple(
         np.broadcast_to(np.vstack([xy[base].T, np.ones(len(support))]), (len(triples), 3, len(support))),
     )
     moved = np.einsum("tcp,ftcx->tfpx", barycentric, xy[:, triples])
-    known = np.logical_and(seen[None], seen[:, triples].all(axis=2).T[:, :, None])
+    together: Bools = np.asarray(seen[:, triples].all(axis=2), dtype=bool)  # (F, T)
+    known: Bools = seen[None] & together.T[:, :, None]
     known[:, base, :] = False  # the base frame maps to itself
     with np.errstate(invalid="ignore"):
         fits = known & (np.linalg.norm(moved - xy[None], axis=3) < config.inlier_error * unit)
