@@ -117,14 +117,16 @@ def test_scale_stays_fixed_and_points_in_front(aside: Scene) -> None:
     assert not found.t[REFERENCE].any()
 
 
-def test_a_step_never_raises_the_cost(aside: Scene) -> None:
-    bundle, e = bundle_of(aside), disturbed(true_estimate(aside), seed=4)
+@pytest.mark.parametrize("seed", range(5))
+def test_a_step_never_raises_the_cost(aside: Scene, seed: int) -> None:
+    bundle, e = bundle_of(aside), disturbed(true_estimate(aside), seed)
+    e = replace(e, X=e.X * [1, 1, 0.1], t=-e.t)  # far off: a whole step often overshoots
     costs = [bundle.cost(bundle.residual(e), 1.0)]
     for steps in range(1, 8):
         moved = bundle.solve(e, [1.0] * steps)
         costs.append(bundle.cost(bundle.residual(moved), 1.0))
     assert (np.diff(costs) <= 1e-9).all()
-    assert costs[-1] < 0.5 * costs[0]
+    assert costs[-1] < costs[0]
 
 
 def test_points_alone_are_found_with_known_cameras(aside: Scene) -> None:
@@ -140,6 +142,7 @@ def test_a_point_beyond_infinity_is_held_there() -> None:
     camera = Camera.path(frames=6, step=(0, 0, 0.3), shake=0.0)
     scene = make_scene(camera, (Mover((3.0, 1.0, 20.0), (0, 0, 1.0)),), static=40, noise=0.0)
     bundle, truth = bundle_of(scene), true_estimate(scene)
+    assert (bundle.solve(truth, [32.0] * 5).X[:, 2] >= 0).all()
     found = bundle.solve_points(truth, 20)
     car = scene.truth == 1
     assert not found.X[car, 2].any()

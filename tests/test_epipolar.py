@@ -47,6 +47,17 @@ def test_split_of_broken_tracks() -> None:
     assert support[scene.truth == 0].mean() > support[scene.truth == 1].mean() + 0.3
 
 
+def test_tracks_born_later_have_no_say_over_the_first() -> None:
+    scene = make_scene(movers=(LEFT_CAR,), noise=0.3)
+    xy = scene.tracks.xy.copy()
+    late = np.arange(len(scene.truth)) % 2 == 1
+    xy[:4, late] = np.nan
+    support = epipolar_support(Tracks.from_array(xy), 0.5, 0)
+    alone = epipolar_support(Tracks.from_array(xy[:, ~late]), 0.5, 0)
+    assert np.array_equal(support[~late], alone)
+    assert support[late & (scene.truth == 0)].mean() > 0.8
+
+
 def test_a_point_never_seen_with_enough_others_has_no_support() -> None:
     xy = make_scene(static=30).tracks.xy.copy()
     xy[:-1, 0] = np.nan  # born in the last frame
