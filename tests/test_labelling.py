@@ -108,6 +108,17 @@ def test_an_object_that_lives_too_short_a_time_goes_too() -> None:
     assert not short.any()
 
 
+def test_objects_keep_their_numbers_when_windows_swap_their_names() -> None:
+    clip = standing_crowd(frames=150)
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        return np.where(ids < 10, 1 + window % 2, np.where(ids < 20, 2 - window % 2, 0))
+
+    labels = label_clip(clip, Told(label), CONFIG)
+    assert numbers_of(clip, labels, np.arange(10)) == [1]
+    assert numbers_of(clip, labels, np.arange(10, 20)) == [2]
+
+
 def test_numbers_follow_the_order_of_appearance_without_gaps() -> None:
     clip = standing_crowd(frames=200)
 

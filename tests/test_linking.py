@@ -80,6 +80,14 @@ def test_a_number_is_never_used_again() -> None:
         seen.add(number)
 
 
+def test_a_track_that_changes_sides_counts_for_the_side_it_is_on() -> None:
+    linker = Linker(3)
+    few = range(5)
+    link(linker, {few: 1, range(5, 10): 1, B: 2})
+    link(linker, {few: 2, range(5, 10): 1, B: 2})
+    assert link(linker, {few: 1}) == {few: {2}}
+
+
 def test_an_object_that_rests_for_a_window_is_known_again() -> None:
     linker = Linker(3)
     link(linker, {A: 1})
