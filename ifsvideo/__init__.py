@@ -4,7 +4,12 @@ A video: ``Pipeline().run("clip.mp4", output="out.mp4", labels="out.csv")``.
 Tracks from anywhere: ``segment(tracks)``.
 """
 
+import os
 from typing import Any
+
+# The matrices are small: several BLAS threads wait for each other longer than they work; on two busy cores
+# segmenting takes five times as long. No effect where numpy was imported before, or the user decided.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from numpy.typing import NDArray
 

@@ -26,8 +26,8 @@ def label_clip(
 ) -> NDArray[np.int32]:
     """Label of every row of the trajectories.
 
-    Windows are segmented one after another, their labels linked, and each observation takes the label that
-    its track has in the window whose centre is nearest in time.
+    Windows are segmented one after another and their labels linked. Whether an observation moves is what the
+    window says whose centre is nearest in time; with which object, what most windows say of its track.
     """
     bounds = window_bounds(trajectories.frames, trajectories.fps, config)
     fixed = camera_fixed_tracks(trajectories, config)
@@ -54,6 +54,8 @@ def label_clip(
         if progress:
             progress(k + 1, len(bounds))
     confirmed = {n for n, windows in seen_in.items() if windows >= min(config.least_windows, len(bounds))}
+    moving = labels > BACKGROUND
+    labels[moving] = [linker.number_of(int(i)) or BACKGROUND for i in trajectories.ids[moving]]
     return _settle(trajectories, labels, confirmed, config)
 
 

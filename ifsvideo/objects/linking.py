@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +16,9 @@ from ifsvideo.types import BACKGROUND
 class Linker:
     """Numbers for the objects of one window after another.
 
+    A track belongs to the object to which most windows gave it: when two objects are taken for one in a
+    window or two, each gets its number back.
+
     Attributes
     ----------
     least_shared : int
@@ -22,8 +26,13 @@ class Linker:
     """
 
     least_shared: int
-    _number_of: dict[int, int] = field(default_factory=dict)
+    _given: dict[int, Counter[int]] = field(default_factory=dict)
     _next: int = 1
+
+    def number_of(self, track: int) -> int | None:
+        """The object of a track, None where no window called it moving; of equal numbers the older."""
+        given = self._given.get(track)
+        return min(given, key=lambda number: (-given[number], number)) if given else None
 
     def link(self, ids: NDArray[np.int64], labels: NDArray[np.int64]) -> NDArray[np.int64]:
         """Replace the window's own labels by the clip's numbers.
@@ -32,10 +41,10 @@ class Linker:
         tracks in all keep theirs; what shares too few is new. Labels 0 and -1 stay.
         """
         here = [int(label) for label in np.unique(labels) if label > BACKGROUND]
-        known = sorted({self._number_of[int(i)] for i in ids if int(i) in self._number_of})
+        numbers = [self.number_of(int(i)) for i in ids]
+        known = sorted({number for number in numbers if number is not None})
         shared = np.zeros((len(here), len(known)), dtype=np.int64)
-        for i, label in zip(ids, labels, strict=True):
-            number = self._number_of.get(int(i))
+        for number, label in zip(numbers, labels, strict=True):
             if number is not None and label > BACKGROUND:
                 shared[here.index(int(label)), known.index(number)] += 1
         number_for: dict[int, int] = {}
@@ -49,5 +58,5 @@ class Linker:
         linked = np.array([number_for.get(int(label), int(label)) for label in labels], dtype=np.int64)
         for i, number in zip(ids, linked, strict=True):
             if number > BACKGROUND:
-                self._number_of[int(i)] = int(number)
+                self._given.setdefault(int(i), Counter())[int(number)] += 1
         return linked

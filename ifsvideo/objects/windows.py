@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.types import BACKGROUND, UNDECIDED, Tracks
 
-_REACH = 20.0
+_REACH = 35.0
 """Distance over which a short track may take an object's label, pixels of a 640x480 picture."""
 _NEIGHBOURS = 8
 """Neighbours that are asked for the label of a short track."""
@@ -88,10 +88,11 @@ def _vote(
         np.nanmax(offset[:, shared], axis=0) - np.nanmin(offset[:, shared], axis=0), axis=1
     )
     way = np.linalg.norm(np.ptp(tracks.xy[seen, p], axis=0))
-    excess = (slip - slip.min()) / (unit + 0.1 * way)
+    excess = (slip - slip.min()) / (0.4 * unit + 0.04 * way)
     weight = np.exp(-excess) / (10 * unit + np.atleast_1d(distance))
-    # An object's label is not carried far: what lies there is seldom a part of it.
-    weight[(labels[near] > BACKGROUND) & (np.atleast_1d(distance) > _REACH * unit)] = 0.0
+    # An object's label is carried neither far nor to what moves otherwise: that is seldom a part of it.
+    far = (np.atleast_1d(distance) > _REACH * unit) | (excess > 1)
+    weight[(labels[near] > BACKGROUND) & far] = 0.0
     if not weight.any():
         return UNDECIDED
     candidates = np.unique(labels[near])

@@ -30,6 +30,9 @@ class SegmenterConfig:
     """Probability that a disk is centred on a foreground point (t_samp)."""
     ransac_iterations: int = 10
     """Triples tried in a disk; the thesis found 10 to be enough."""
+    through_centre: bool = True
+    """Whether a disk's model must explain the point in its centre. The thesis does not ask for it, and then a
+    small object's disk is won by the background around it."""
     inlier_error: float = 2.0
     """Transfer error below which a point fits a triple in a frame (t_in), pixels."""
     nearest_models: int = 5
@@ -125,6 +128,7 @@ class SegmenterConfig:
         return cls(
             split="epipolar",
             models=60,
+            through_centre=False,
             centred=False,
             attribute_data=True,
             merging="shear",

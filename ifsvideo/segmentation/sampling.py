@@ -76,10 +76,11 @@ def sample_models(
         fg = bool(rng.random() < config.foreground_share)
         pool = pools[0] if (fg and len(pools[0])) or not len(pools[1]) else pools[1]
         fg = pool is pools[0]
-        centre = tracks.xy[base, rng.choice(pool)]
-        near = np.linalg.norm(tracks.xy[base] - centre, axis=1) < config.disk_radius * unit  # eq. 3.1
-        support = np.flatnonzero(usable & near)
-        best = _best_triple(tracks, support, base, unit, config, rng)
+        centre = int(rng.choice(pool))
+        distance = np.linalg.norm(tracks.xy[base] - tracks.xy[base, centre], axis=1)
+        support = np.flatnonzero(usable & (distance < config.disk_radius * unit))  # eq. 3.1
+        through = centre if config.through_centre else None
+        best = _best_triple(tracks, support, through, base, unit, config, rng)
         if best is not None:
             mask = np.zeros(tracks.points, dtype=bool)
             mask[best[0]] = True
@@ -96,16 +97,21 @@ def sample_models(
 def _best_triple(
     tracks: Tracks,
     support: NDArray[np.int64],
+    through: int | None,
     base: int,
     unit: float,
     config: SegmenterConfig,
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Inliers and control points of the triple that explains most of the support, None where no triple
-    serves."""
+    """Inliers and control points of the triple that explains most of the support, None where none serves.
+
+    ``through`` names a point that must be one of the three."""
     if len(support) < 3:
         return None
     triples = np.array([rng.choice(len(support), 3, replace=False) for _ in range(config.ransac_iterations)])
+    if through is not None:
+        own = int(np.searchsorted(support, through))
+        triples[~(triples == own).any(axis=1), 0] = own
     xy = tracks.xy[:, support]
     seen = tracks.visible[:, support]
     corners = xy[base, triples]

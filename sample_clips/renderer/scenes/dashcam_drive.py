@@ -36,14 +36,13 @@ def build() -> Scene:
         return pose((x, -1.32 + heave(t) - bump(t, 1.15, 0.02), z), yaw, pitch, shake[2](t))
 
     def oncoming(t: float) -> Array:
-        # From 12 m/s down to 3, swinging out; a steady car on a bend could pass for a nearer parked one.
-        braking = np.clip(t - 0.3, 0.0, 1.4)
-        z = 50.0 - 12.0 * t + 9.0 / 2.8 * braking**2 + 9.0 * max(t - 1.7, 0.0)
+        # From 4 m/s it speeds up and swings out; a steady car on a bend could pass for a nearer parked one.
+        z = 52.5 - 4.0 * t - 5.5 / 2 * max(t - 0.3, 0.0) ** 2
         step = 0.02
         before, now, after = (
-            smoothstep(t + dt, 0.3, 1.3) - smoothstep(t + dt, 1.5, 2.5) for dt in (-step, 0.0, step)
+            smoothstep(t + dt, 0.2, 1.1) - smoothstep(t + dt, 1.2, 2.3) for dt in (-step, 0.0, step)
         )
-        swing = 1.3
+        swing = 1.6
         steer = (after - before) * swing / (2 * step) / 8.0
         return course.at(z, LANES[0] - 0.15 + swing * now, np.pi - float(np.arctan(steer)))
 
@@ -68,7 +67,7 @@ def build() -> Scene:
         "dashcam_drive",
         FRAMES,
         FPS,
-        540.0,
+        640.0,
         bodies,
         daylight(rng),
         camera,

@@ -51,7 +51,7 @@ def build() -> Scene:
         "follow_car",
         FRAMES,
         FPS,
-        600.0,
+        700.0,
         bodies,
         daylight(rng),
         camera,

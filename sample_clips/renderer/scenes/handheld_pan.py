@@ -20,8 +20,8 @@ def build() -> Scene:
     """The scene."""
     rng = np.random.default_rng(53)
     tea, rice = (
-        carton(rng, (0.19, 0.27, 0.09), (196, 92, 48), "CRISPS"),
-        carton(rng, (0.2, 0.15, 0.14), (60, 112, 158), "TEA"),
+        carton(rng, (0.26, 0.36, 0.13), (196, 92, 48), "CRISPS"),
+        carton(rng, (0.28, 0.21, 0.2), (60, 112, 158), "TEA"),
     )
 
     def tall_box(t: float) -> Array:
@@ -49,8 +49,8 @@ def build() -> Scene:
         )
 
     bodies = (
-        Body(tea, 1, "tall box", tall_box, (blob(0.3, 0.2, np.eye(4), 0.3),)),
-        Body(rice, 2, "low box", low_box, (blob(0.31, 0.25, np.eye(4), 0.3),)),
+        Body(tea, 1, "tall box", tall_box, (blob(0.4, 0.27, np.eye(4), 0.3),)),
+        Body(rice, 2, "low box", low_box, (blob(0.42, 0.35, np.eye(4), 0.3),)),
         _room(rng),
     )
     backdrop = Backdrop(Texture.of(plain(rng, (64, 128), (120, 116, 110))), -1.5, 1.5, (150, 148, 140), 400.0)
