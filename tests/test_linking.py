@@ -80,12 +80,22 @@ def test_a_number_is_never_used_again() -> None:
         seen.add(number)
 
 
-def test_a_track_that_changes_sides_counts_for_the_side_it_is_on() -> None:
+def test_a_track_counts_for_the_object_that_most_windows_gave_it_to() -> None:
     linker = Linker(3)
     few = range(5)
     link(linker, {few: 1, range(5, 10): 1, B: 2})
     link(linker, {few: 2, range(5, 10): 1, B: 2})
+    link(linker, {few: 2, range(5, 10): 1, B: 2})
+    assert linker.number_of(0) == 2
     assert link(linker, {few: 1}) == {few: {2}}
+
+
+def test_two_objects_taken_for_one_in_a_window_get_their_numbers_back() -> None:
+    linker = Linker(3)
+    link(linker, {A: 1, B: 2})
+    link(linker, {A: 1, B: 2})
+    link(linker, {A: 1, B: 1})
+    assert link(linker, {A: 1, B: 2}) == {A: {1}, B: {2}}
 
 
 def test_an_object_that_rests_for_a_window_is_known_again() -> None:
