@@ -35,8 +35,8 @@ class TrackerConfig:
     birth_interval: int = 3
     """Frames between two searches for new corners; at 30 a second an empty place is filled within 0.1 s."""
     window: int = 11
-    """Side of the KLT window, pixels, odd. OpenCV's 21 drags background along within 10 px of a moving edge:
-    on the sample clips that doubles the points wrongly called moving."""
+    """Side of the KLT window, pixels, odd. OpenCV's 21 drags background along within 10 px of a moving edge;
+    it can be compared by this setting and ``python -m ifsvideo.benchmark samples --config``."""
     max_return_error: float = 0.001
     """Greatest distance between a point and itself tracked forward and back, share of the diagonal: 0.7 px at
     640x360 (Kalal et al., Forward-Backward Error, ICPR 2010)."""
