@@ -7,8 +7,8 @@ Tracks from anywhere: ``segment(tracks)``.
 import os
 from typing import Any
 
-# The matrices are small: several BLAS threads wait for each other longer than they work. No effect where numpy
-# was imported before, or the user decided.
+# The matrices are small: several BLAS threads wait for each other longer than they work. No effect where
+# numpy was imported before, or the user decided.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from numpy.typing import NDArray
