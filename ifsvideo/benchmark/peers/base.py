@@ -58,7 +58,7 @@ class Peer(ABC):
             raise ValueError(f"the number of motions is at least 1, got {motions}")
         labels = np.full(tracks.points, UNDECIDED, dtype=np.int64)
         complete = np.flatnonzero(tracks.visible.all(axis=0))
-        if 2 * tracks.frames > AFFINE_RANK and len(complete) > AFFINE_RANK * motions:
+        if 2 * tracks.frames > AFFINE_RANK and len(complete) >= (AFFINE_RANK + 1) * motions:
             groups = self.divide(tracks.select(complete), motions, np.random.default_rng(self.seed))
             labels[complete] = by_size(groups)
         decided = (labels != UNDECIDED).astype(np.float64)
