@@ -117,6 +117,13 @@ class ObjectsConfig:
     like motion in one window seldom do so again in the next, which sees half of the same frames."""
     least_seconds: float = 0.5
     """What lives shorter is no object; its points go to the background."""
+    check_borders: bool = True
+    """Whether tracks that move with an object are asked if their own pixels show it or the ground behind it
+    (`ifsvideo.objects.figure_ground`); costs one more reading of the video."""
+    least_ground_misfit: float = 1.65
+    """How many times worse than the object the ground must fit the pixels of a track called moving. Less, and
+    corners outside an outline stay with the object; at 2.1, one in a hundred of those on it is lost for
+    nothing (``python -m ifsvideo.benchmark samples --config``)."""
     fixed_spread: float = 0.9
     """Radius within which a point fixed to the camera stays, pixels: KLT's jitter on a weak reflection."""
     fixed_shake: float = 3.0
@@ -140,7 +147,7 @@ class ObjectsConfig:
         for name in ("least_life", "fixed_world_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise UsageError(f"objects.{name} must be 0 to 1, got {getattr(self, name)}")
-        for name in ("least_seconds", "fixed_travel"):
+        for name in ("least_seconds", "least_ground_misfit", "fixed_travel"):
             if not getattr(self, name) >= 0:
                 raise UsageError(f"objects.{name} must not be negative, got {getattr(self, name)}")
 

@@ -1,14 +1,16 @@
-"""From a clip to labels and a coloured overlay: read, track, segment and link, write."""
+"""From a clip to labels and a coloured overlay: read, track, segment and link, check borders, write."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,9 @@ from ifsvideo.clip import Source, check_outputs, open_clip
 from ifsvideo.config import Config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, ignore_mask
+from ifsvideo.objects.figure_ground import FigureGround
 from ifsvideo.objects.labelling import label_clip
+from ifsvideo.objects.numbering import settle
 from ifsvideo.output.atomic import Outputs
 from ifsvideo.output.labels import write_labels
 from ifsvideo.output.overlay import OverlayRenderer
@@ -25,6 +29,7 @@ from ifsvideo.segmentation.segmenter import IFSSegmenter
 from ifsvideo.tracking.tracker import KltTracker
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import (
+    BACKGROUND,
     UNDECIDED,
     Bools,
     Image,
@@ -128,8 +133,12 @@ class Pipeline:
         mask = ignore_mask(ignore, clip.info)
         log = _Log(progress)
         with Outputs() as outputs:
-            trajectories = clip.trajectories or self._track(clip.frames, mask, log)
-            table = self._label(trajectories, motions, log)
+            trajectories = _ordered(clip.trajectories or self._track(clip.frames, mask, log))
+            found = self._label(trajectories, motions, log)
+            found = self._check_borders(clip.frames, trajectories, found, log)
+            table = LabelTable(
+                trajectories.frame, trajectories.ids, trajectories.xy, found, trajectories.frames
+            )
             if video is not None and clip.frames is not None:
                 sound = clip.path if audio and clip.info.has_audio else None
                 writer = VideoWriter(video, clip.info, audio_from=sound, outputs=outputs)
@@ -152,16 +161,27 @@ class Pipeline:
             raise ValueError(f"the tracker gave points for {found.frames} of {counted.count} frames")
         return found
 
-    def _label(self, points: Trajectories, motions: int | None, log: _Log) -> LabelTable:
-        labels = np.full(len(points.frame), UNDECIDED, dtype=np.int32)
-        if len(labels) and points.frames > 1:
-            with log.stage("segmenting"):
-                told = log.teller("segmenting")
-                labels = label_clip(points, self.segmenter, self.config.objects, motions, told)
-        order = _order(points)
-        return LabelTable(
-            points.frame[order], points.ids[order], points.xy[order], labels[order], points.frames
-        )
+    def _label(self, points: Trajectories, motions: int | None, log: _Log) -> NDArray[np.int32]:
+        """Label of every row of the trajectories."""
+        if not len(points.frame) or points.frames == 1:
+            return np.full(len(points.frame), UNDECIDED, dtype=np.int32)
+        with log.stage("segmenting"):
+            told = log.teller("segmenting")
+            return label_clip(points, self.segmenter, self.config.objects, motions, told)
+
+    def _check_borders(
+        self, source: FrameSource | None, points: Trajectories, labels: NDArray[np.int32], log: _Log
+    ) -> NDArray[np.int32]:
+        """The labels without what rides along outside an object's outline; as they are without pictures."""
+        config = self.config.objects
+        if source is None or not config.check_borders or not (labels > BACKGROUND).any():
+            return labels
+        check = FigureGround(points, labels)
+        with log.stage("checking borders"), closing(source.frames()) as frames:
+            for image in log.each("checking borders", frames, points.frames):
+                check.add(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False))
+            on_ground = check.on_ground(config.least_ground_misfit)
+        return settle(points, np.where(on_ground, BACKGROUND, labels).astype(np.int32), config)
 
     def _draw(self, source: FrameSource, table: LabelTable, writer: VideoWriter, log: _Log) -> None:
         scenes = Scenes(table, source.info, self.config.overlay.trail_s)
@@ -218,14 +238,14 @@ def _exact(fps: Fraction | float | None) -> Fraction | None:
     return Fraction(fps).limit_denominator(100_000)
 
 
-def _order(points: Trajectories) -> NDArray[np.intp]:
-    """The rows by frame, then track."""
+def _ordered(points: Trajectories) -> Trajectories:
+    """The same rows, by frame, then track."""
     order = np.lexsort((points.ids, points.frame))
     frame, ids = points.frame[order], points.ids[order]
     twice = np.flatnonzero((np.diff(frame) == 0) & (np.diff(ids) == 0))
     if len(twice):
         raise ValueError(f"track {ids[twice[0]]} has two points in frame {frame[twice[0]]}")
-    return order
+    return replace(points, frame=frame, ids=ids, xy=points.xy[order])
 
 
 def _remarks(table: LabelTable) -> list[str]:

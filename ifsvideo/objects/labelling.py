@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.objects.camera_fixed import camera_fixed_tracks
 from ifsvideo.objects.linking import Linker
+from ifsvideo.objects.numbering import settle
 from ifsvideo.objects.windows import follow_neighbours, window_bounds
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import BACKGROUND, UNDECIDED, Segmenter
@@ -53,23 +54,8 @@ def label_clip(
         labels[first:last][known] = found[np.searchsorted(tracks.ids, ids[known])]
         if progress:
             progress(k + 1, len(bounds))
-    confirmed = {n for n, windows in seen_in.items() if windows >= min(config.least_windows, len(bounds))}
+    confirmed = [n for n, windows in seen_in.items() if windows >= min(config.least_windows, len(bounds))]
     moving = labels > BACKGROUND
     labels[moving] = [linker.number_of(int(i)) or BACKGROUND for i in trajectories.ids[moving]]
-    return _settle(trajectories, labels, confirmed, config)
-
-
-def _settle(
-    trajectories: Trajectories, labels: NDArray[np.int32], confirmed: set[int], config: ObjectsConfig
-) -> NDArray[np.int32]:
-    """Send what lives too short to the background; number the objects in the order in which they appear."""
-    fps = trajectories.fps or 30.0
-    numbers = []
-    for number in confirmed:
-        frames = trajectories.frame[labels == number]
-        if len(frames) and (int(frames.max()) - int(frames.min()) + 1) / fps >= config.least_seconds:
-            numbers.append((int(frames.min()), number))
-    final = {number: k + 1 for k, (_, number) in enumerate(sorted(numbers))}
-    table = np.arange(-1, int(labels.max(initial=0)) + 1)
-    table[2:] = [final.get(int(number), BACKGROUND) for number in table[2:]]
-    return table[labels + 1].astype(np.int32)
+    labels[moving & ~np.isin(labels, confirmed)] = BACKGROUND
+    return settle(trajectories, labels, config)

@@ -1,0 +1,242 @@
+"""A square that slides over a textured ground: whose pixels a point shows decides, not how it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from ifsvideo.config import Config, ObjectsConfig
+from ifsvideo.objects.figure_ground import FigureGround
+from ifsvideo.pipeline import Pipeline
+from ifsvideo.tracking.trajectories import Trajectories
+from ifsvideo.types import FramePoints, Segmentation, Tracks, VideoInfo
+from ifsvideo.video import FrameSource
+
+WIDTH, HEIGHT, FRAMES, SIDE = 320, 240, 30, 60
+LEFT, TOP = 60, 90
+STEP, PAN = 2, -1
+"""Pixels a frame, to the right, of the square and of the ground."""
+RATIO = ObjectsConfig().least_ground_misfit
+
+
+def blotches(height: int, width: int, seed: int, contrast: float) -> np.ndarray:
+    """Smooth texture without any plain place, (H, W) float; its standard deviation in grey levels."""
+    rough = np.random.default_rng(seed).normal(size=(height, width)).astype(np.float32)
+    smooth = cv2.GaussianBlur(rough, (0, 0), 1.5)
+    return 128 + contrast * smooth / smooth.std()
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Pictures, tracks and the tracks' kinds."""
+
+    greys: list[np.ndarray]
+    points: Trajectories
+    ground: np.ndarray
+    on_object: np.ndarray
+    outside: np.ndarray
+
+    def labels(self) -> np.ndarray:
+        return np.where(np.isin(self.points.ids, self.ground), 0, 1).astype(np.int32)
+
+    def ground_beside_the_square(self) -> np.ndarray:
+        """Tracks of the ground, those nearest to the square's way first."""
+        away = np.abs(self.points.xy - (LEFT + SIDE, TOP + SIDE)).max(axis=1)
+        rows = np.flatnonzero(np.isin(self.points.ids, self.ground) & (self.points.frame == 10))
+        return self.points.ids[rows[np.argsort(away[rows])]]
+
+    def sent_home(self) -> set[int]:
+        """Tracks that the check takes from the object, in all their rows."""
+        check = FigureGround(self.points, self.labels())
+        for grey in self.greys:
+            check.add(grey)
+        rows = check.on_ground(RATIO)
+        ids = set(self.points.ids[rows].tolist())
+        assert rows.sum() == np.isin(self.points.ids, list(ids)).sum()
+        return ids
+
+
+def sliding_square(*, step: int = STEP, contrast: float = 40.0, scale: int = 1) -> Clip:
+    """Tracks on the ground (from 0), 4 px inside the square (from 1000) and 2 px outside it (from 2000), the
+    last riding along; tracks of the ground are not seen under the square. ``contrast`` is the ground's.
+    Pictures and tracks are a bit noisy.
+    """
+    rng = np.random.default_rng(0)
+    wall = blotches(HEIGHT, WIDTH + FRAMES, 1, contrast)
+    square = blotches(SIDE, SIDE, 2, 40.0)
+    greys = []
+    for f in range(FRAMES):
+        grey = wall[:, -PAN * f : WIDTH - PAN * f].copy()
+        left = LEFT + step * f
+        grey[TOP : TOP + SIDE, left : left + SIDE] = square
+        grey = np.clip(grey + rng.normal(0, 4, grey.shape), 0, 255).astype(np.uint8)
+        greys.append(grey.repeat(scale, axis=0).repeat(scale, axis=1))
+    along = np.arange(4.0, SIDE - 4, 8)
+    square_now = np.array([LEFT, TOP]) + np.arange(FRAMES)[:, None, None] * [step, 0]
+    inside = square_now + [(a, b) for a in along for b in along]
+    outside = square_now + np.concatenate([*_sides(along, -2.0), *_sides(along, SIDE + 1.0)])
+    places = [(x, y) for x in range(20, WIDTH - 20, 12) for y in range(20, HEIGHT - 20, 12)]
+    still = np.arange(FRAMES)[:, None, None] * [PAN, 0] + np.array(places, float)
+    under = still - square_now
+    hidden = ((under > -6) & (under < SIDE + 5)).all(axis=2)
+    still[hidden] = np.nan
+    still = still[:, hidden.mean(axis=0) < 0.4]
+    parts = (still, inside, outside)
+    ids = [1000 * k + np.arange(part.shape[1]) for k, part in enumerate(parts)]
+    xy = np.concatenate(parts, axis=1)
+    xy = (xy + rng.normal(0, 0.1, xy.shape) + 0.5) * scale - 0.5
+    tracks = Tracks.from_array(xy, ids=np.concatenate(ids), size=(WIDTH * scale, HEIGHT * scale), fps=30.0)
+    return Clip(greys, Trajectories.from_tracks(tracks), *ids)
+
+
+def _sides(along: np.ndarray, far: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points along an upright and along a level side of the square."""
+    beside = np.full_like(along, far)
+    return np.column_stack([beside, along]), np.column_stack([along, beside])
+
+
+def only(clip: Clip, rows: np.ndarray) -> Clip:
+    """The same pictures with some of the observations."""
+    points = clip.points
+    kept = replace(points, frame=points.frame[rows], ids=points.ids[rows], xy=points.xy[rows])
+    return replace(clip, points=kept)
+
+
+@pytest.mark.parametrize("contrast", [10.0, 40.0])
+def test_points_outside_the_outline_that_ride_along_go_to_the_ground(contrast) -> None:
+    """Before a ground of little contrast the object fits them not so badly; but before or behind the square,
+    where the ground is not covered a moment later or earlier, it fits better."""
+    clip = sliding_square(contrast=contrast)
+    assert clip.sent_home() == set(clip.outside.tolist())
+
+
+def test_large_pictures_are_looked_at_as_the_tracker_does(monkeypatch) -> None:
+    """In twice the size, above what is tracked in full, all is the same."""
+    small = sliding_square().sent_home()
+    monkeypatch.setattr("ifsvideo.objects.figure_ground.LARGEST", 1.1 * np.hypot(WIDTH, HEIGHT))
+    assert sliding_square(scale=2).sent_home() == small
+
+
+def test_without_relative_motion_nothing_changes() -> None:
+    assert not sliding_square(step=PAN).sent_home()
+
+
+def test_before_a_plain_ground_nothing_changes() -> None:
+    """There are no corners on it; those far away say nothing of what lies behind the square."""
+    clip = sliding_square(contrast=0)
+    x, y = clip.points.xy.T
+    near = (x > LEFT - 40) & (x < LEFT + SIDE + STEP * FRAMES + 40) & (y > TOP - 40) & (y < TOP + SIDE + 40)
+    assert not only(clip, ~near | (clip.points.ids >= 1000)).sent_home()
+
+
+def test_a_plain_patch_tells_nothing() -> None:
+    clip = sliding_square(contrast=0)
+    for grey in clip.greys:
+        grey[:] = 128
+    assert not clip.sent_home()
+
+
+def test_few_tracks_of_the_ground_tell_nothing() -> None:
+    clip = sliding_square()
+    beside = clip.ground_beside_the_square()
+    for count, tells in ((7, False), (8, True)):
+        kept = np.isin(clip.points.ids, beside[:count]) | (clip.points.ids >= 1000)
+        assert bool(only(clip, kept).sent_home()) == tells
+
+
+def test_tracks_seen_shortly_are_not_judged() -> None:
+    clip = sliding_square()
+    assert not only(clip, (clip.points.ids < 2000) | (clip.points.frame < 3)).sent_home()
+
+
+def test_no_points_are_no_error() -> None:
+    clip = sliding_square()
+    assert not only(clip, np.zeros(len(clip.points.ids), bool)).sent_home()
+
+
+class Pictures(FrameSource):
+    """The frames of a clip."""
+
+    path = Path("square.mp4")
+    info = VideoInfo(WIDTH, HEIGHT, Fraction(30))
+
+    def __init__(self, clip: Clip) -> None:
+        self.clip = clip
+
+    def frames(self):
+        for grey in self.clip.greys:
+            yield np.dstack([grey] * 3)
+
+
+@dataclass
+class Given:
+    """A tracker that knows the tracks, and a segmenter that knows what they are."""
+
+    clip: Clip
+    label_of_kind: tuple[int, int, int]
+
+    def track(self, frames, ignore=None):
+        points = self.clip.points
+        for f, _ in enumerate(frames):
+            rows = points.frame == f
+            yield FramePoints(points.ids[rows], points.xy[rows])
+
+    def segment(self, tracks, motions=None):
+        labels = np.array(self.label_of_kind)[tracks.ids // 1000]
+        return Segmentation(labels, labels == 0, labels, np.ones(len(labels)))
+
+
+def run(label_of_kind: tuple[int, int, int], config: ObjectsConfig | None = None):
+    clip = sliding_square()
+    given = Given(clip, label_of_kind)
+    stages = []
+    pipeline = Pipeline(Config(objects=config or ObjectsConfig()), tracker=given, segmenter=given)
+    result = pipeline.run(Pictures(clip), progress=lambda *step: stages.append(step))
+    checked = [step[1:] for step in stages if step[0] == "checking borders"]
+    labels = [result.table.labels[result.table.ids // 1000 == kind] for kind in range(3)]
+    return result, labels, checked
+
+
+def test_the_pipeline_checks_borders_as_a_stage_of_its_own() -> None:
+    result, (ground, on_object, outside), checked = run((0, 1, 1))
+    assert not ground.any()
+    assert (on_object == 1).all()
+    assert not outside.any()
+    assert checked == [(done, FRAMES) for done in range(FRAMES + 1)]
+    assert "checking borders" in result.seconds
+
+
+def test_an_object_that_was_nothing_but_border_leaves_no_gap() -> None:
+    before, (_, on_object, outside), _ = run((0, 2, 1), ObjectsConfig(check_borders=False))
+    assert [item.label for item in before.objects] == [1, 2]
+    assert (outside == 1).all()
+    assert (on_object == 2).all()
+    result, (_, on_object, outside), _ = run((0, 2, 1))
+    assert [item.label for item in result.objects] == [1]
+    assert (on_object == 1).all()
+    assert not outside.any()
+
+
+@pytest.mark.parametrize(
+    ("label_of_kind", "config"),
+    [((0, 1, 1), ObjectsConfig(check_borders=False)), ((0, 0, 0), ObjectsConfig())],
+)
+def test_the_check_is_left_out_where_it_is_not_wanted_or_nothing_moves(label_of_kind, config) -> None:
+    result, (_, on_object, outside), checked = run(label_of_kind, config)
+    assert (on_object == label_of_kind[1]).all()
+    assert (outside == label_of_kind[2]).all()
+    assert not checked
+    assert "checking borders" not in result.seconds
+
+
+def test_tracks_without_pictures_are_not_checked() -> None:
+    clip = sliding_square()
+    tracks = clip.points.window(0, FRAMES)
+    result = Pipeline(segmenter=Given(clip, (0, 1, 1))).run(tracks)
+    assert (result.table.labels[result.table.ids >= 1000] == 1).all()
+    assert "checking borders" not in result.seconds
