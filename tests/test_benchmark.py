@@ -404,10 +404,17 @@ def test_configuration_by_name_and_by_file(tmp_path: Path) -> None:
     ("arguments", "status", "message"),
     [
         (["hopkins155", "nowhere"], 3, "nowhere: no such folder"),
-        (["hopkins155", ".", "--json", "nowhere/a.json"], 4, "nowhere/a.json: cannot be written"),
+        (["hopkins155", ".", "--json", "nowhere/a.json"], 4, "nowhere/a.json: the folder nowhere does not"),
+        (["hopkins155", ".", "--json", "."], 4, "is a folder"),
         (["samples", ".", "--motions-known"], 2, "--motions-known"),
+        (["samples", ".", "--drop", "0.1"], 2, "--drop"),
         (["other", "."], 2, "invalid choice"),
-        (["samples", ".", "--runs", "0"], 2, "--runs"),
+        (["samples", ".", "--runs", "0"], 2, "--runs: '0' is not a whole number of at least 1"),
+        (["hopkins155", ".", "--seed", "-1"], 2, "--seed"),
+        (["hopkins155", ".", "--noise", "-1"], 2, "--noise: '-1' is no number of pixels"),
+        (["hopkins155", ".", "--noise", "nan"], 2, "--noise: 'nan' is no number of pixels"),
+        (["hopkins155", ".", "--drop", "1"], 2, "--drop: '1' is no share"),
+        (["hopkins155", ".", "--show", "cars1"], 2, "--show draws pictures; say where by --plot DIR"),
     ],
 )
 def test_command_refuses_in_one_line(arguments: list[str], status: int, message: str, tmp_path: Path) -> None:
@@ -445,17 +452,12 @@ def test_command_runs_the_segmenter(tmp_path: Path) -> None:
 def test_a_failed_write_leaves_the_old_file_and_no_stray_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     out = tmp_path / "scores.json"
     out.write_text("old")
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(OutputError, match=r"scores\.json: cannot be written \(No space"):
         command._write(out, {"dataset": "hopkins155"})
     assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
-
-
-def test_unwritable_json_is_refused_before_the_work(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be written"):
-        command._check_output(tmp_path)

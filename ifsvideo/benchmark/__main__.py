@@ -2,16 +2,18 @@
 
 hopkins155  DIR holds NAME/NAME_truth.mat
 kt3dmoseg   DIR holds NAME_Tracks.mat, and frames, where there are, under OriginalSequences/NAME/
+tracks      DIR or its subfolders hold tracks of your own, NAME.npz: xy (F, P, 2) pixels, NaN where not seen,
+            optional visible (F, P), labels (P,) integers: groups from 1, 0 not known; or .mat as above
 samples     DIR holds NAME.mp4 and NAME_truth.npz (masks (F, H, W) uint8: 0 background, k object k)
 
-Scoring of hopkins155 and kt3dmoseg. Error of one sequence, per cent: 100 x (1 - the greatest number of
-points that a one-to-one matching of estimated to true labels gets right / labelled points), -1 counting as
-wrong, true label 0 not counted; averaged over runs, then over sequences. Exact count: per cent of
+Scoring of hopkins155, kt3dmoseg and tracks. Error of one sequence, per cent: 100 x (1 - the greatest number
+of points that a one-to-one matching of estimated to true labels gets right / labelled points), -1 counting
+as wrong, true label 0 not counted; averaged over runs, then over sequences. Exact count: per cent of
 (sequence, run) pairs with the right number of groups among the labelled points, background included.
 Seconds: spent segmenting, on one thread, summed over the sequences, of one run. Std: of the mean error,
 over runs. Moves: a point is truly moving if its group is not 1, called moving if its label is > 0;
 precision and recall in per cent over the points of all sequences and runs together. All one motion: the
-error of calling everything background.
+error of calling everything background. Beside hopkins155 stand the figures that were published for it.
 
 Scoring of samples. The whole pipeline runs on each clip, and every row of the labels is compared with the
 mask at its rounded position (all rows count, also those at a mask's border); a row truly moves if the mask
@@ -21,7 +23,7 @@ truth, rows with label > 0 as predictions, IDTP the rows that the best one-to-on
 numbers over the whole clip gets right. Longest false: the longest life, in seconds, of an object of which
 less than half the rows move. Mean over runs, then over clips.
 
-Run r uses seed S + r.
+Run r uses seed S + r, for the segmenter, for its peers, and for --noise and --drop.
 """
 
 from __future__ import annotations
@@ -31,16 +33,25 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ifsvideo.benchmark import datasets, samples, table
-from ifsvideo.benchmark.runner import IFSFactory, Report, run_points
+from ifsvideo.benchmark import comparison, datasets, samples, table
+from ifsvideo.benchmark.comparison import Method, Trial
+from ifsvideo.benchmark.datasets import LabelledSequence
+from ifsvideo.benchmark.perturb import Perturbation
+from ifsvideo.benchmark.runner import IFSFactory, Report
 from ifsvideo.config import Config
 from ifsvideo.config_file import load_config
-from ifsvideo.errors import IfsVideoError, OutputError, UsageError
+from ifsvideo.errors import IfsVideoError, UsageError
+from ifsvideo.output.atomic import check_writable, output_error, replacing
 from ifsvideo.segmentation.config import SegmenterConfig
+
+_STATUS = """\
+exit status: 0 done; 1 fault of the program; 2 wrong use, or --plot without matplotlib; 3 input cannot be
+read; 4 output cannot be written; 130, 143 interrupted
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,11 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, _terminate)
     try:
-        _check_output(options.json)
-        report = {"dataset": options.dataset, **_measure(options, _configuration(options.config))}
-        print(_as_table(report, options.verbose))
-        if options.json:
-            _write(options.json, report)
+        _check(options)
+        if options.dataset == "samples":
+            _measure_samples(options)
+        else:
+            _measure_points(options)
     except IfsVideoError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return fault.exit_status
@@ -65,32 +76,66 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m ifsvideo.benchmark",
         description=__doc__,
+        epilog=_STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("dataset", metavar="DATASET", choices=("hopkins155", "kt3dmoseg", "samples"))
-    parser.add_argument("folder", metavar="DIR", type=Path, help="where the data set lies")
-    parser.add_argument("--runs", metavar="N", type=_positive, default=1, help="runs of every sequence (1)")
-    parser.add_argument("--seed", metavar="S", type=int, default=0, help="seed of the first run (0)")
-    parser.add_argument(
-        "--jobs", metavar="N", type=_positive, default=os.cpu_count() or 1, help="processes (all CPUs)"
+    add = parser.add_argument
+    add("dataset", metavar="DATASET", choices=("hopkins155", "kt3dmoseg", "tracks", "samples"))
+    add("folder", metavar="DIR", type=Path, help="where the data set lies")
+    add("--runs", metavar="N", type=_whole(1), default=1, help="runs of every sequence (1)")
+    add("--seed", metavar="S", type=_whole(0), default=0, help="seed of the first run (0)")
+    add("--jobs", metavar="N", type=_whole(1), default=os.cpu_count() or 1, help="processes (all CPUs)")
+    add("--config", metavar="FILE", default="default", help='a TOML file, or "thesis" or "default" (default)')
+    add("--json", metavar="FILE", type=Path, help="write all figures there")
+    add("--only", metavar="NAME-GLOB", default="*", help="only sequences with such a name")
+    points = parser.add_argument_group("of hopkins155, kt3dmoseg and tracks only")
+    add = points.add_argument
+    add("--motions-known", action="store_true", help="tell the segmenter the number of motions")
+    add("--peers", action="store_true", help="also run others' methods, each told the number of motions")
+    add(
+        "--noise",
+        metavar="SIGMA",
+        type=_sigma,
+        default=0.0,
+        help="Gaussian noise added to the tracks, pixels",
     )
-    parser.add_argument(
-        "--motions-known", action="store_true", help="tell the segmenter the number of motions"
+    add(
+        "--drop", metavar="SHARE", type=_share, default=0.0, help="share of the observations deleted, below 1"
     )
-    parser.add_argument(
-        "--config", metavar="FILE", default="default", help='a TOML file, or "thesis" or "default" (default)'
+    add(
+        "--plot",
+        metavar="DIR",
+        type=Path,
+        help="draw errors, noise (six more measurements) and numbers of motions there (needs ifsvideo[plot])",
     )
-    parser.add_argument("--json", metavar="FILE", type=Path, help="write all figures there")
-    parser.add_argument("--only", metavar="NAME-GLOB", default="*", help="only sequences with such a name")
-    parser.add_argument("--verbose", action="store_true", help="a line for each sequence of hopkins155, too")
+    add("--show", metavar="NAME", help="with --plot: draw the stages of this sequence, too")
+    add("--verbose", action="store_true", help="a line for each sequence of hopkins155, too")
     return parser
 
 
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise ValueError
-    return value
+def _whole(least: int) -> Callable[[str], int]:
+    """A converter to whole numbers of at least ``least``."""
+
+    def convert(text: str) -> int:
+        if not (text.isascii() and text.isdigit()) or int(text) < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least {least}")
+        return int(text)
+
+    return convert
+
+
+def _sigma(text: str) -> float:
+    try:
+        return Perturbation(noise=float(text)).noise
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of pixels, 0 or more") from None
+
+
+def _share(text: str) -> float:
+    try:
+        return Perturbation(drop=float(text)).drop
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no share from 0 to below 1, such as 0.1") from None
 
 
 def _terminate(*_: object) -> NoReturn:
@@ -98,24 +143,80 @@ def _terminate(*_: object) -> NoReturn:
     sys.exit(143)
 
 
-def _measure(options: argparse.Namespace, config: Config) -> Report:
+def _check(options: argparse.Namespace) -> None:
+    """Refuse what cannot end well before the work, not after it."""
     if options.dataset == "samples":
-        if options.motions_known:
-            raise UsageError(
-                "--motions-known: the number changes along a clip; leave the option out for samples"
-            )
-        chosen = samples.clips(options.folder, options.only)
-        factory = samples.PipelineFactory(config)
-        return samples.run_samples(chosen, factory, options.runs, options.seed, options.jobs)
+        given = {
+            name
+            for name in ("motions_known", "peers", "noise", "drop", "plot", "show")
+            if vars(options)[name]
+        }
+        if given:
+            name = min(given).replace("_", "-")
+            raise UsageError(f"--{name}: is for tracks with a truth; leave the option out for samples")
+    if options.show is not None and not options.plot:
+        raise UsageError("--show draws pictures; say where by --plot DIR")
+    if options.json:
+        check_writable(options.json)
+    if options.plot:
+        _need_matplotlib()
+        check_writable(options.plot / "errors.png" if options.plot.is_dir() else options.plot)
+
+
+def _need_matplotlib() -> None:
+    try:
+        import matplotlib  # noqa: F401
+    except ModuleNotFoundError:
+        raise UsageError("--plot needs matplotlib; install it by: pip install 'ifsvideo[plot]'") from None
+
+
+def _measure_samples(options: argparse.Namespace) -> None:
+    chosen = samples.clips(options.folder, options.only)
+    factory = samples.PipelineFactory(_configuration(options.config))
+    scores = samples.run_samples(chosen, factory, options.runs, options.seed, options.jobs)
+    report = {"dataset": options.dataset, "configuration": options.config, **scores}
+    print(table.samples(report))
+    if options.json:
+        _write(options.json, report)
+
+
+def _measure_points(options: argparse.Namespace) -> None:
     sequences = datasets.load(options.dataset, options.folder, options.only)
-    make = IFSFactory(config.segmentation)
-    return run_points(sequences, make, options.runs, options.seed, options.jobs, options.motions_known)
+    shown = next((sequence for sequence in sequences if sequence.name == options.show), None)
+    if options.show is not None and shown is None:
+        raise UsageError(
+            f"--show: no sequence is called {options.show}; --verbose without --show lists their names"
+        )
+    own = Method("ifsvideo", IFSFactory(_configuration(options.config).segmentation), options.motions_known)
+    methods = [own, *(_peers() if options.peers else ())]
+    trial = Trial(options.runs, options.seed, options.jobs, Perturbation(options.noise, options.drop))
+    scores = comparison.compare(options.dataset, sequences, methods, trial)
+    report = {"dataset": options.dataset, "configuration": options.config, **scores}
+    if options.plot:
+        report["noise_curve"] = comparison.noise_curve(sequences, methods, trial, report)
+    print(table.points(report, by_sequence=options.verbose or options.dataset != "hopkins155"))
+    if options.json:
+        _write(options.json, report)
+    if options.plot:
+        _draw(options.plot, report, shown, own, trial)
 
 
-def _as_table(report: Report, verbose: bool) -> str:
-    if report["dataset"] == "samples":
-        return table.samples(report)
-    return table.points(report, by_sequence=verbose or report["dataset"] == "kt3dmoseg")
+def _draw(folder: Path, report: Report, shown: LabelledSequence | None, method: Method, trial: Trial) -> None:
+    # Imported here because matplotlib is an extra.
+    from ifsvideo.benchmark import plots, plots_sequence
+
+    figures = plots.of_report(report)
+    if shown:
+        figures |= plots_sequence.of_sequence(shown, method, trial)
+    for file in plots.write(figures, folder):
+        print(f"wrote {file}")
+
+
+def _peers() -> list[Method]:
+    # Imported here because only --peers needs them.
+    from ifsvideo.benchmark.peers import PEERS, PeerFactory
+
+    return [Method(name, PeerFactory(name), motions_known=True) for name in PEERS]
 
 
 def _configuration(name: str) -> Config:
@@ -127,24 +228,13 @@ def _configuration(name: str) -> Config:
     return load_config(name)
 
 
-def _check_output(path: Path | None) -> None:
-    """Refuse a place that cannot be written before the work, not after it."""
-    if path and (path.is_dir() or not os.access(path.absolute().parent, os.W_OK)):
-        raise OutputError(
-            f"{path}: cannot be written; give a file in a folder that exists and may be written"
-        )
-
-
 def _write(path: Path, report: Report) -> None:
-    """Write the report beside its place and move it there when complete."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError as fault:
-        raise OutputError(f"{path}: cannot be written ({fault.strerror}); choose another place") from fault
-    finally:
-        part.unlink(missing_ok=True)
+    """Write the report as JSON; an older file stands until the new one is complete."""
+    with replacing(path) as part:
+        try:
+            part.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        except OSError as fault:
+            raise output_error(path, fault) from fault
 
 
 if __name__ == "__main__":

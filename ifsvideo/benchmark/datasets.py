@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 
 from ifsvideo.errors import InputError, UsageError
+from ifsvideo.tracking.files import load_tracks
 from ifsvideo.types import Tracks
 
 _KINDS = (
@@ -23,6 +24,8 @@ _KINDS = (
     ("articulated", r"arm|articulated|head|kanatani3(?!\d)|people|two_cranes"),
 )
 """Kinds of Hopkins-155, by the start of the name."""
+_OWN = "tracks"
+"""Kind of a user's own sequences."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def load(dataset: str, folder: Path, only: str = "*") -> list[LabelledSequence]:
 
     Parameters
     ----------
-    dataset : {"hopkins155", "kt3dmoseg"}
+    dataset : {"hopkins155", "kt3dmoseg", "tracks"}
     folder : Path
         Where the data set lies.
     only : str
@@ -79,34 +82,50 @@ def load(dataset: str, folder: Path, only: str = "*") -> list[LabelledSequence]:
     UsageError
         If no name fits the pattern.
     """
-    pattern, suffix, reader = _LAYOUTS[dataset]
-    files = dict(_named_files(folder, pattern, suffix))
+    layout = _LAYOUTS[dataset]
+    files = _named_files(folder, layout)
     chosen = [name for name in sorted(files) if fnmatchcase(name, only)]
     if not chosen:
         raise UsageError(f"{folder}: no sequence is called {only}; there are {', '.join(sorted(files))}")
-    return [_load_one(name, files[name], reader) for name in chosen]
+    return [_load_one(name, files[name], layout) for name in chosen]
 
 
-def _named_files(folder: Path, pattern: str, suffix: str) -> Iterator[tuple[str, Path]]:
-    """Yield name and file of each sequence; any name that occurs is taken."""
+@dataclass(frozen=True)
+class _Layout:
+    """How a data set lies in its folder: patterns of its files, their reader, and what helps a bad file."""
+
+    patterns: tuple[str, ...]
+    reader: Callable[[str, Path], LabelledSequence]
+    remedy: str
+
+
+def _named_files(folder: Path, layout: _Layout) -> dict[str, Path]:
+    """Name and file of each sequence; any name that occurs is taken."""
+    expected = " or ".join(layout.patterns)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; give the folder that holds {pattern}")
-    files = [file for file in folder.glob(pattern) if file.is_file()]
-    if not files:
-        raise InputError(f"{folder}: holds no {pattern}; give the data set's top folder")
-    for file in files:
-        yield file.name.removesuffix(suffix), file
+        raise InputError(f"{folder}: no such folder; give the folder that holds {expected}")
+    named: dict[str, Path] = {}
+    for file in sorted(file for pattern in layout.patterns for file in folder.glob(pattern)):
+        name = re.sub(r"(_truth|_Tracks)$", "", file.stem)
+        if name in named:
+            raise InputError(f"{file}: is called {name} as {named[name]} is; rename one of them")
+        named[name] = file
+    if not named:
+        raise InputError(f"{folder}: holds no {expected}; give the data set's top folder")
+    return named
 
 
-def _load_one(name: str, file: Path, reader: Callable[[str, Path], LabelledSequence]) -> LabelledSequence:
+def _load_one(name: str, file: Path, layout: _Layout) -> LabelledSequence:
     """Read one file; whatever is wrong with it becomes an `InputError` that names it."""
     try:
-        return reader(name, file)
+        return layout.reader(name, file)
+    except InputError:  # says all that there is to say
+        raise
     except KeyError as fault:
-        raise InputError(f"{file}: has no field {fault}; fetch the data set's own file again") from fault
-    except Exception as fault:  # a damaged .mat file makes loadmat raise nearly anything
+        raise InputError(f"{file}: has no field {fault}; {layout.remedy}") from fault
+    except Exception as fault:  # a damaged file makes its reader raise nearly anything
         reason = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
-        raise InputError(f"{file}: cannot be read ({reason}); fetch the file again") from fault
+        raise InputError(f"{file}: cannot be read ({reason}); {layout.remedy}") from fault
 
 
 def _read_hopkins(name: str, file: Path) -> LabelledSequence:
@@ -129,6 +148,20 @@ def _read_kt3dmoseg(name: str, file: Path) -> LabelledSequence:
     return LabelledSequence(name, "driving", tracks, fields["GtLabel"].ravel().astype(np.int64))
 
 
+def _read_own(name: str, file: Path) -> LabelledSequence:
+    """Anybody's tracks: ``.npz`` with xy, optional visible, and labels (P,); or a ``.mat`` of either data
+    set."""
+    tracks = load_tracks(file)
+    if file.suffix == ".mat":
+        reader = _read_hopkins if "y" in loadmat(file, variable_names=["y"]) else _read_kt3dmoseg
+        return replace(reader(name, file), kind=_OWN)
+    with np.load(file) as content:
+        labels = content["labels"]
+    if not np.issubdtype(labels.dtype, np.integer) or (labels < 0).any():
+        raise ValueError("labels are not integers from 0")
+    return LabelledSequence(name, _OWN, tracks, labels.astype(np.int64))
+
+
 def _frames_first(homogeneous: NDArray[Any]) -> NDArray[np.float64]:
     """(3, P, F) homogeneous coordinates as (F, P, 2); a .mat file drops a last axis of one."""
     points = homogeneous.reshape(*homogeneous.shape[:2], -1)
@@ -144,8 +177,13 @@ def _frame_size(folder: Path) -> tuple[int, int] | None:
     return int(width), int(height)
 
 
-_LAYOUTS: dict[str, tuple[str, str, Callable[[str, Path], LabelledSequence]]] = {
-    "hopkins155": ("*/*_truth.mat", "_truth.mat", _read_hopkins),
-    "kt3dmoseg": ("*_Tracks.mat", "_Tracks.mat", _read_kt3dmoseg),
+_FETCH = "fetch the data set's own file again"
+_LAYOUTS = {
+    "hopkins155": _Layout(("*/*_truth.mat",), _read_hopkins, _FETCH),
+    "kt3dmoseg": _Layout(("*_Tracks.mat",), _read_kt3dmoseg, _FETCH),
+    "tracks": _Layout(
+        ("*.npz", "*.mat", "*/*.npz", "*/*.mat"),
+        _read_own,
+        "give .npz with xy (F, P, 2) and labels (P,), from 1 and 0 where not known, or a data set's .mat",
+    ),
 }
-"""Pattern of the files, what follows the name, reader."""

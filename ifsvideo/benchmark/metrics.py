@@ -47,6 +47,13 @@ def best_matching(estimated: Labels, true: Labels) -> int:
     return int(counts[rows, columns].sum())
 
 
+def matching(estimated: Labels, true: Labels) -> dict[int, int]:
+    """Estimated label of each true one in that matching; a true label that is left over is not there."""
+    rows, columns = linear_sum_assignment(overlaps(estimated, true), maximize=True)
+    found, groups = np.unique(estimated), np.unique(true)
+    return {int(groups[column]): int(found[row]) for row, column in zip(rows, columns, strict=True)}
+
+
 def error(estimated: Labels, true: Labels) -> float:
     """Misclassified points, per cent of the labelled ones.
 

@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from ifsvideo.benchmark import metrics
 from ifsvideo.benchmark.datasets import LabelledSequence
+from ifsvideo.benchmark.perturb import UNCHANGED, Perturbation
 from ifsvideo.errors import IfsVideoError
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.types import Segmenter
@@ -53,6 +54,7 @@ class Run:
     factory: Callable[[int], Segmenter]
     seed: int
     motions: int | None
+    perturbation: Perturbation = UNCHANGED
 
     def __str__(self) -> str:
         return f"{self.sequence.name}, seed {self.seed}"
@@ -71,8 +73,9 @@ class Score:
 def score(run: Run) -> Score:
     """Segment one sequence and compare with its truth."""
     segmenter = run.factory(run.seed)
+    tracks = run.perturbation.apply(run.sequence.tracks, run.seed)
     start = time.perf_counter()
-    labels = segmenter.segment(run.sequence.tracks, run.motions).labels
+    labels = segmenter.segment(tracks, run.motions).labels
     seconds = time.perf_counter() - start
     truth = run.sequence.truth
     return Score(
@@ -84,7 +87,11 @@ def score(run: Run) -> Score:
 
 
 def in_processes(
-    function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: int, quiet: bool = False
+    function: Callable[[Task], Outcome],
+    tasks: Sequence[Task],
+    jobs: int,
+    quiet: bool = False,
+    title: str | None = None,
 ) -> list[Outcome]:
     """Apply a function to every task, each in a process with one BLAS and OpenCV thread; keeps the order.
 
@@ -101,7 +108,7 @@ def in_processes(
             futures = {pool.submit(function, task): place for place, task in enumerate(tasks)}
             done: dict[int, Outcome] = {}
             for future in tqdm(
-                as_completed(futures), total=len(tasks), disable=quiet, unit="run", leave=False
+                as_completed(futures), title, len(tasks), disable=quiet, unit="run", leave=False
             ):
                 fault = future.exception()
                 if isinstance(fault, BrokenProcessPool):
@@ -145,6 +152,8 @@ def run_points(
     jobs: int = 1,
     motions_known: bool = False,
     quiet: bool = False,
+    perturbation: Perturbation = UNCHANGED,
+    title: str | None = None,
 ) -> Report:
     """Segment every sequence ``runs`` times, with seeds ``seed``, ``seed + 1``, ..., and report the scores.
 
@@ -158,16 +167,21 @@ def run_points(
         Whether the segmenter is told the number of true groups.
     quiet : bool
         Whether progress is kept off stderr.
+    perturbation : Perturbation
+        What is done to the tracks first, by the run's seed.
+    title : str, optional
+        What the progress bar is called.
     """
     tasks = [
-        Run(sequence, factory, seed + run, sequence.motions if motions_known else None)
+        Run(sequence, factory, seed + run, sequence.motions if motions_known else None, perturbation)
         for sequence in sequences
         for run in range(runs)
     ]
-    scores = in_processes(score, tasks, jobs, quiet)
+    scores = in_processes(score, tasks, jobs, quiet, title)
     by_sequence = [scores[start : start + runs] for start in range(0, len(scores), runs)]
     rows = [_row(sequence, reached) for sequence, reached in zip(sequences, by_sequence, strict=True)]
-    return {"runs": runs, "seed": seed, "motions_known": motions_known, **_totals(rows, scores)}
+    told = {"motions_known": motions_known, "noise": perturbation.noise, "drop": perturbation.drop}
+    return {"runs": runs, "seed": seed, **told, **_totals(rows, scores)}
 
 
 def _row(sequence: LabelledSequence, reached: Sequence[Score]) -> Report:
@@ -178,6 +192,7 @@ def _row(sequence: LabelledSequence, reached: Sequence[Score]) -> Report:
         "kind": sequence.kind,
         "motions": sequence.motions,
         "points": sequence.tracks.points,
+        "labelled": int((sequence.truth > 0).sum()),
         "frames": sequence.tracks.frames,
         "estimated": [one.estimated for one in reached],
         "error": float(np.mean(errors)),
@@ -199,11 +214,11 @@ def _totals(rows: Sequence[Report], scores: Sequence[Score]) -> Report:
     return {
         "error": error,
         "median": every["median"],
-        "std": float(np.std(np.mean([row["errors"] for row in rows], axis=0))),
+        "std": every["std"],
         "exact_count": every["exact_count"],
         "one_motion": float(np.mean([row["one_motion"] for row in rows])),
         "moves": sum((one.moves for one in scores), metrics.MovesCount()).as_dict(),
-        "seconds": float(sum(row["seconds"] for row in rows)),
+        "seconds": every["seconds"],
         "breakdown": _breakdown(rows),
         "sequences": list(rows),
     }
@@ -223,11 +238,14 @@ def _breakdown(rows: Sequence[Report]) -> list[Report]:
 
 
 def _summary(rows: Sequence[Report]) -> dict[str, float]:
-    """Mean and median over sequences; per cent of (sequence, run) pairs with the right number of groups."""
+    """Mean and median over sequences, standard deviation of the mean over runs, per cent of (sequence, run)
+    pairs with the right number of groups, seconds of one run."""
     exact = [count == row["motions"] for row in rows for count in row["estimated"]]
     errors = [row["error"] for row in rows]
     return {
         "error": float(np.mean(errors)),
         "median": float(np.median(errors)),
+        "std": float(np.std(np.mean([row["errors"] for row in rows], axis=0))),
         "exact_count": 100.0 * float(np.mean(exact)),
+        "seconds": float(sum(row["seconds"] for row in rows)),
     }

@@ -29,21 +29,104 @@ def _text(cell: Any) -> str:
 
 
 def points(report: Report, by_sequence: bool) -> str:
-    """The table of a point data set; a line for each sequence or for each kind."""
+    """The tables of a point data set: sequences, kinds and numbers of motions, methods side by side."""
     parts = [_sequences(report)] if by_sequence else []
-    if report["dataset"] == "hopkins155":
+    if len(report["breakdown"]) > 2:  # one kind of one number of motions is the footer's line again
         parts.append(_breakdown(report))
+    if report["peers"] or report["published"]:
+        parts.append(_methods(report))
+    if "noise_curve" in report:
+        parts.append(_noise_curve(report["noise_curve"]))
     parts.append(_footer(report))
     return "\n\n".join(parts)
 
 
 def _breakdown(report: Report) -> str:
-    fields = ("kind", "motions", "sequences", "error", "median", "exact_count")
-    header = ("kind", "motions", "sequences", "error %", "median %", "exact count %")
-    return align(header, [[row[field] for field in fields] for row in report["breakdown"]])
+    """A line for each method measured, kind and number of motions."""
+    fields = ("kind", "motions", "sequences", "error", "median", "std", "exact_count", "seconds")
+    header = (
+        "method",
+        "kind",
+        "motions",
+        "sequences",
+        "error %",
+        "median %",
+        "std %",
+        "exact count %",
+        "seconds",
+    )
+    kinds = {row["kind"] for row in report["breakdown"]}
+    rows = [
+        [one["method"], *(_scatter(one, row) if field == "std" else row[field] for field in fields)]
+        for one in (report, *report["peers"])
+        for row in one["breakdown"]
+        if row["kind"] == "all" or len(kinds) > 2
+    ]
+    return align(header, rows)
+
+
+def _methods(report: Report) -> str:
+    """Methods side by side: measured in this run, then as published."""
+    numbers = sorted({key for one in (report, *report["published"]) for key in one["error"]} - {"all"})
+    header = ("method", "number of motions", "all %", *(f"{number} motions %" for number in numbers))
+    header += ("median %", "std %", "exact count %", "seconds")
+    measured = [
+        [
+            one["method"],
+            *_told_and_errors(one, numbers),
+            *(one["median"], _scatter(one, one), one["exact_count"], one["seconds"]),
+        ]
+        for one in (report, *report["peers"])
+    ]
+    printed = [
+        [
+            f"{one['method']} (published)",
+            *_told_and_errors(one, numbers),
+            None,
+            one["std"],
+            None,
+            one["seconds"],
+        ]
+        for one in report["published"]
+    ]
+    lines = [align(header, measured + printed)]
+    if printed:
+        lines.append(
+            "published: all 155 sequences, complete tracks, no noise added; seconds on machines of their time"
+        )
+    return "\n".join(lines)
+
+
+def _told_and_errors(one: Report, numbers: Sequence[str]) -> list[Any]:
+    told = "given" if one["motions_known"] else "found"
+    return [told, *(one["error"].get(key) for key in ("all", *numbers))]
+
+
+def _scatter(report: Report, row: Report) -> float | None:
+    """Standard deviation over runs; one run has none."""
+    deviation: float = row["std"]
+    return deviation if report["runs"] > 1 else None
+
+
+def _noise_curve(curve: Sequence[Report]) -> str:
+    """Error of every method against the noise added."""
+    numbers = sorted({key for one in curve for key in one["error"]} - {"all"})
+    header = (
+        "method",
+        "noise px",
+        "number of motions",
+        "all %",
+        *(f"{number} motions %" for number in numbers),
+    )
+    rows = [
+        [one["method"], float(one["noise"]), *_told_and_errors(one, numbers), one["exact_count"]]
+        for one in curve
+    ]
+    return align((*header, "exact count %"), rows)
 
 
 def _sequences(report: Report) -> str:
+    """A line for each sequence of the package's own method."""
     header = ("sequence", "motions", "found", "error %", "one motion %", "precision %", "recall %", "seconds")
     moves = report["dataset"] == "kt3dmoseg"
     kept = [name for name in header if moves or name not in ("precision %", "recall %")]
@@ -58,18 +141,32 @@ def _sequences(report: Report) -> str:
 
 def _footer(report: Report) -> str:
     """The figures over all sequences, a line each."""
-    moves, exact = report["moves"], report["exact_count"]
     by_motions = [f"{key} motions {value:.2f}" for key, value in report["error"].items() if key != "all"]
-    told = ", number of motions given" if report["motions_known"] else ""
+    size = f"{len(report['sequences'])} sequences, {report['runs']} runs"
     lines = [
-        f"{report['dataset']}: {len(report['sequences'])} sequences, {report['runs']} runs{told}",
+        f"{report['dataset']}: {size}{_conditions(report)}",
         f"error %: {report['error']['all']:.2f} ({', '.join(by_motions)}), median {report['median']:.2f}, "
-        f"std over runs {report['std']:.2f}; all one motion: {report['one_motion']:.2f}",
-        f"exact count %: {exact:.1f}   seconds of one run: {report['seconds']:.1f}",
+        f"std over runs {_text(_scatter(report, report))}; all one motion: {report['one_motion']:.2f}",
+        f"exact count %: {report['exact_count']:.1f}   seconds of one run: {report['seconds']:.1f}",
     ]
     if report["dataset"] == "kt3dmoseg":
+        moves = report["moves"]
         lines.append(f"moves: precision % {_text(moves['precision'])}, recall % {_text(moves['recall'])}")
+    labelled, every = (sum(row[key] for row in report["sequences"]) for key in ("labelled", "points"))
+    if labelled < every:
+        lines.append(f"points counted: {labelled} of {every}; the others have no true label (0)")
     return "\n".join(lines)
+
+
+def _conditions(report: Report) -> str:
+    """What the run was told, and what was done to the tracks."""
+    parts = {
+        f"configuration {report['configuration']}": report["configuration"] != "default",
+        "number of motions given": report["motions_known"],
+        f"noise {report['noise']:g} px": report["noise"],
+        f"{100 * report['drop']:g} % of the observations dropped": report["drop"],
+    }
+    return "".join(f", {text}" for text, holds in parts.items() if holds)
 
 
 def samples(report: Report) -> str:
