@@ -23,6 +23,9 @@ truth, rows with label > 0 as predictions, IDTP the rows that the best one-to-on
 numbers over the whole clip gets right. Longest false: the longest life, in seconds, of an object of which
 less than half the rows move. Mean over runs, then over clips.
 
+--peers also runs RANSAC, SSC and RSIM, each told the number of motions; they decide on tracks without a gap
+only. "Given" and "found" say so of every method.
+
 Run r uses seed S + r, for the segmenter, for its peers, and for --noise and --drop.
 """
 

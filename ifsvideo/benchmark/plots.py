@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ifsvideo.benchmark.runner import Report
+from ifsvideo.benchmark.table import heading
 from ifsvideo.errors import OutputError
 from ifsvideo.output.atomic import output_error, replacing
 
@@ -19,6 +21,8 @@ _MARKERS = "os^Dv<>"
 _HATCHES = ("", "///", "...", "xx")
 _BIN = 5.0
 """Width of a bar of the histogram, per cent."""
+_USUAL_WORST = 45.0
+"""The histogram reaches so far, per cent, even where all is well, so that pictures compare."""
 
 
 def write(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
@@ -66,13 +70,6 @@ def of_report(report: Report) -> dict[str, Figure]:
     }
 
 
-def _title(report: Report) -> str:
-    """What was measured, for the head of a picture."""
-    runs = "1 run" if report["runs"] == 1 else f"{report['runs']} runs"
-    sequences = f"{len(report['sequences'])} sequences"
-    return f"{report['dataset']}, configuration {report['configuration']}: {sequences}, {runs}"
-
-
 def _named(method: Report) -> str:
     return f"{method['method']} (number of motions {'given' if method['motions_known'] else 'found'})"
 
@@ -83,12 +80,12 @@ def error_histogram(report: Report) -> Figure:
     figure = Figure(figsize=(8, 1.2 + 2.6 * len(methods)), layout="constrained")
     rows = figure.subplots(len(methods), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     worst = max(row["error"] for method in methods for row in method["sequences"])
-    edges = np.arange(0, _BIN * (worst // _BIN + 2), _BIN)
+    edges = np.arange(0, _BIN * (max(worst, _USUAL_WORST) // _BIN + 2), _BIN)
     for axes, method in zip(rows, methods, strict=True):
         _histogram(axes, method, edges)
     rows[0].legend(frameon=False)
     rows[-1].set_xlabel(f"misclassified points of a sequence, mean over runs, % (bars of {_BIN:g})")
-    figure.suptitle(_title(report))
+    figure.suptitle(heading(report))
     return figure
 
 
@@ -115,6 +112,7 @@ def _histogram(axes: Axes, method: Report, edges: np.ndarray) -> None:
             axes.text(left + _BIN / 2, total, f"{total:.0f}", ha="center", va="bottom")
     axes.margins(y=0.15)
     axes.set_xlim(0, edges[-1])
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel("sequences")
     axes.set_title(
         f"{_named(method)}: mean {method['error']['all']:.2f} %, median {method['median']:.2f} %", fontsize=10
@@ -143,7 +141,7 @@ def noise_curve(report: Report) -> Figure:
     panels[0].set_ylim(bottom=0)
     panels[0].set_ylabel("misclassified points, %")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
-    figure.suptitle(_title(report))
+    figure.suptitle(heading({**report, "noise": 0}))
     return figure
 
 
@@ -154,7 +152,7 @@ def motion_counts(report: Report) -> Figure:
     found = list(range(min(map(min, pairs)), max(map(max, pairs)) + 1))
     counts = np.array([[pairs.count((row, column)) for column in found] for row in true])
     shares = 100 * counts / counts.sum(axis=1, keepdims=True)
-    figure = Figure(figsize=(2.5 + 1.1 * len(found), 2.4 + 0.9 * len(true)), layout="constrained")
+    figure = Figure(figsize=(max(8, 2.5 + 1.1 * len(found)), 2.4 + 0.9 * len(true)), layout="constrained")
     axes = figure.subplots()
     image = axes.imshow(shares, cmap="Blues", vmin=0, vmax=100, aspect="auto")
     for (row, column), count in np.ndenumerate(counts):
@@ -169,5 +167,5 @@ def motion_counts(report: Report) -> Figure:
     axes.set_xlabel("number of motions found (bold: right)")
     axes.set_ylabel("true number")
     figure.colorbar(image, label="% of the row")
-    figure.suptitle(f"{_title(report)}\nright in {report['exact_count']:.1f} %", fontsize=10)
+    figure.suptitle(f"{heading(report)}\nright in {report['exact_count']:.1f} %", fontsize=10)
     return figure

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ifsvideo.benchmark.comparison import Method, Trial
@@ -49,7 +50,7 @@ def draw_stages(sequence: LabelledSequence, tracks: Tracks, segmentation: Segmen
     """The points after each stage of the segmenter, where they lie in the frame that sees most of them."""
     stages = groups_by_stage(segmentation, sequence.truth)
     place = anchors(tracks)
-    figure = Figure(figsize=(13, 7.6), layout="constrained")
+    figure = Figure(figsize=(13, 1 + 2 * (0.4 + 13 / 3 * _slope(place, tracks.size))), layout="constrained")
     panels = figure.subplots(2, 3).ravel()
     for axes, (name, groups) in zip(panels, stages.items(), strict=False):
         _points(axes, place, groups, tracks.size)
@@ -81,16 +82,30 @@ def _points(axes: Axes, place: NDArray[np.float64], groups: Groups, size: tuple[
 
 
 def _as_picture(axes: Axes, place: NDArray[np.float64], size: tuple[int, int] | None) -> None:
-    """Axes of the picture's size, y down; of what the points span where nobody told the size."""
-    low, high = np.nanmin(place, axis=0) - 10, np.nanmax(place, axis=0) + 10
-    if size:
-        low, high = np.minimum(low, 0), np.maximum(high, size)
+    """Axes of the picture, y down."""
+    low, high = _extent(place, size)
     axes.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]), aspect="equal", xticks=[], yticks=[])
+
+
+def _extent(
+    place: NDArray[np.float64], size: tuple[int, int] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of the picture; of what the points span where nobody told its size, or where they leave it."""
+    low, high = np.nanmin(place, axis=0) - 10, np.nanmax(place, axis=0) + 10
+    return (np.minimum(low, 0), np.maximum(high, size)) if size else (low, high)
+
+
+def _slope(place: NDArray[np.float64], size: tuple[int, int] | None) -> float:
+    """Height of the picture over its width, within what fits a screen."""
+    low, high = _extent(place, size)
+    width, height = high - low
+    return float(np.clip(height / width, 0.25, 1.5))
 
 
 def draw_pairs(name: str, tracks: Tracks, pairs: list[Pair]) -> Figure:
     """Two segments at the beginning and the end, and their cumulative shear and stretch (thesis Fig. 3.5)."""
-    figure = Figure(figsize=(15, 0.8 + 3.6 * len(pairs)), layout="constrained")
+    height = max(2.6, 0.6 + 15 / 4 * _slope(tracks.xy.reshape(-1, 2), tracks.size))
+    figure = Figure(figsize=(15, 0.8 + height * len(pairs)), layout="constrained")
     rows = figure.subplots(len(pairs), 4, squeeze=False)
     for row, pair in zip(rows, pairs, strict=True):
         _pair_at(row[0], tracks, pair, 0, f"segments {pair.title}, frame 0")
@@ -119,8 +134,7 @@ def _pair_at(axes: Axes, tracks: Tracks, pair: Pair, frame: int, title: str) -> 
         )
     axes.set_title(title, fontsize=10)
     axes.legend(loc="lower right", fontsize=8)
-    if np.isfinite(tracks.xy).any():
-        _as_picture(axes, tracks.xy.reshape(-1, 2), tracks.size)
+    _as_picture(axes, tracks.xy.reshape(-1, 2), tracks.size)
 
 
 def _curves(axes: Axes, curves: Mapping[str, NDArray[np.float64]], label: str) -> None:
@@ -128,6 +142,7 @@ def _curves(axes: Axes, curves: Mapping[str, NDArray[np.float64]], label: str) -
         colour, style = _STYLES[name]
         axes.plot(np.arange(1, len(curve) + 1), curve, style, color=colour, label=name)
     axes.set_xlabel("frame")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_title(label, fontsize=10)
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)

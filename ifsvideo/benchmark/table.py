@@ -90,6 +90,8 @@ def _methods(report: Report) -> str:
         for one in report["published"]
     ]
     lines = [align(header, measured + printed)]
+    if report["peers"]:
+        lines.append("peers: tracks with a gap stay undecided, which counts as wrong")
     if printed:
         lines.append(
             "published: all 155 sequences, complete tracks, no noise added; seconds on machines of their time"
@@ -142,9 +144,8 @@ def _sequences(report: Report) -> str:
 def _footer(report: Report) -> str:
     """The figures over all sequences, a line each."""
     by_motions = [f"{key} motions {value:.2f}" for key, value in report["error"].items() if key != "all"]
-    size = f"{len(report['sequences'])} sequences, {report['runs']} runs"
     lines = [
-        f"{report['dataset']}: {size}{_conditions(report)}",
+        heading(report),
         f"error %: {report['error']['all']:.2f} ({', '.join(by_motions)}), median {report['median']:.2f}, "
         f"std over runs {_text(_scatter(report, report))}; all one motion: {report['one_motion']:.2f}",
         f"exact count %: {report['exact_count']:.1f}   seconds of one run: {report['seconds']:.1f}",
@@ -158,15 +159,17 @@ def _footer(report: Report) -> str:
     return "\n".join(lines)
 
 
-def _conditions(report: Report) -> str:
-    """What the run was told, and what was done to the tracks."""
+def heading(report: Report) -> str:
+    """What was measured: data set, size, what the method was told, and what was done to the tracks."""
+    runs = "1 run" if report["runs"] == 1 else f"{report['runs']} runs"
     parts = {
         f"configuration {report['configuration']}": report["configuration"] != "default",
         "number of motions given": report["motions_known"],
         f"noise {report['noise']:g} px": report["noise"],
         f"{100 * report['drop']:g} % of the observations dropped": report["drop"],
     }
-    return "".join(f", {text}" for text, holds in parts.items() if holds)
+    conditions = "".join(f", {text}" for text, holds in parts.items() if holds)
+    return f"{report['dataset']}: {len(report['sequences'])} sequences, {runs}{conditions}"
 
 
 def samples(report: Report) -> str:
