@@ -60,34 +60,23 @@ class SegmenterConfig:
     iterations: int = 20
     """Iterations of TRW-S at most."""
     merging: Literal["evidence", "shear"] = "evidence"
-    """Stage 5: ``shear`` is the thesis's Algorithm 3, ``evidence`` weighs shear with rigidity and the static
-    world."""
+    """Stage 5: ``shear`` is the thesis's Algorithm 3, ``evidence`` weighs shear with cross prediction, nearness
+    and the static world."""
     pairs: int = 10
     """Point pairs between two segments in which shear is measured."""
     shear_ratio: float = 3.0
     """lambda of Algorithm 2: segments are apart if the shear between them exceeds so many times that
     inside."""
     evidence_threshold: float = 5.0
-    """How many times farther than usual in the window a segment must be from a static point's way to be as
+    """How many times farther than usual in the window a point must be from a static point's way to be as
     likely moving as not."""
-    evidence_slope: float = 4.0
-    """Steepness of that decision: at 1.5 times the threshold motion is certain by 5 to 1."""
-    few_points_doubt: float = 4.0
-    """Log odds against motion, over the number of points: a segment of four counts as 1 in 2.7."""
-    rigidity: float = 4.0
-    """Distance from a common rigid motion at which two moving segments are as likely one as two, in units of
-    the error that a static point is granted."""
-    rigidity_slope: float = 1.0
-    """Steepness of that decision."""
-    shear_slope: float = 3.0
-    """Weight of shear beside rigidity."""
-    gap: float = 50.0
-    """Distance at which nearness stops to speak for one object, pixels; two pieces of one are nearer, two
-    things farther."""
-    gap_slope: float = 3.0
-    """Log odds for one object of two moving segments that touch."""
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
+    least_odds: float = 0.5
+    """Log odds by which a group of points must be another motion than the background; below, it belongs to it."""
+    few_points_doubt: float = 15.0
+    """The same asked on top, over the number of points: a group of five is believed at 30 to 1, one of fifty at
+    2 to 1. What slips along an edge is seldom more than a handful."""
 
     def __post_init__(self) -> None:
         for name, values in (("split", ("world", "epipolar")), ("merging", ("evidence", "shear"))):
@@ -103,7 +92,6 @@ class SegmenterConfig:
                 raise UsageError(f"segmentation.{entry.name} must not be negative, got {value}")
         for name in (
             "evidence_threshold",
-            "rigidity",
             "models",
             "disk_radius",
             "ransac_iterations",

@@ -1,55 +1,88 @@
-"""Affine rigid motion as a subspace: trajectories of one rigid body span three dimensions round their
-mean."""
+"""Affine motion as a subspace: trajectories of one body before an affine camera span few dimensions."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.types import Tracks
 
+Array = NDArray[np.float64]
 
-def rigid_residual(tracks: Tracks, rank: int = 3, iterations: int = 8) -> NDArray[np.float64]:
-    """How far each trajectory is from the best common subspace of all given ones.
 
-    Under an affine camera the trajectories of one rigid body lie in a 3-dimensional affine subspace (Tomasi
-    and Kanade, IJCV 1992). Complete tracks are fitted by singular values; with gaps, frames and points are
-    solved in turn by least squares over what was measured.
-
-    Returns
-    -------
-    (P,) float
-        Root of the mean square distance per frame, pixels, with the degrees of freedom that the point itself
-        spends taken off; 0 where it has no more measurements than those.
-    """
-    frames, points = tracks.frames, tracks.points
-    seen = np.repeat(tracks.visible, 2, axis=0).astype(np.float64)
+def trajectory_matrix(tracks: Tracks) -> tuple[Array, Array]:
+    """W (2F, P), centred, zero where a point is not seen, and its mask (2F, P) of ones and zeros."""
     centre = np.nanmean(tracks.xy, axis=(0, 1))
-    W = np.nan_to_num((tracks.xy - centre).transpose(0, 2, 1).reshape(2 * frames, points))
-    free = np.maximum(tracks.visible.sum(axis=0) - rank / 2, 0.5)
-    rank = min(rank, points - 1, 2 * frames)
-    if rank < 1:
-        return np.zeros(points)
-    filled = along_mean_path(W, seen)
-    mean = filled.mean(axis=1)
-    U, S, V = np.linalg.svd(filled - mean[:, None], full_matrices=False)
-    basis = np.column_stack([U[:, :rank] * S[:rank], mean])  # the mean is one more column, its coefficient 1
-    if seen.all():
-        error = W - basis @ np.vstack([V[:rank], np.ones(points)])
+    W = np.nan_to_num((tracks.xy - centre).transpose(0, 2, 1).reshape(2 * tracks.frames, tracks.points))
+    return W, np.repeat(tracks.visible, 2, axis=0).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Subspace:
+    """The affine subspace near which the trajectories of one body lie.
+
+    Three dimensions hold any rigid body under an affine camera (Tomasi and Kanade, IJCV 1992), two a flat one,
+    or one that moves by an affine map of the picture.
+
+    Attributes
+    ----------
+    directions : (2F, rank) float
+    mean : (2F,) float
+    """
+
+    directions: Array
+    mean: Array
+
+    @classmethod
+    def fit(cls, W: Array, seen: Array, rank: int, iterations: int = 5) -> Subspace:
+        """Best subspace of trajectories (2F, P): by singular values where they are complete; with gaps,
+        directions and points are solved in turn by least squares over what was measured."""
+        points = W.shape[1]
+        rank = min(rank, points - 1, len(W))
+        filled = along_mean_path(W, seen)
+        mean = filled.mean(axis=1)
+        U, S, _ = np.linalg.svd(filled - mean[:, None], full_matrices=False)
+        found = cls(U[:, :rank] * (S[:rank] / np.sqrt(points)), mean)
+        if rank < 1 or seen.all():
+            return found
+        for _ in range(iterations):
+            place = np.vstack([found._coordinates(W, seen), np.ones(points)])
+            # Each row of W: its directions and mean from the points that are seen in it.
+            products = (place[:, None] * place[None]).reshape(-1, points)
+            left = (seen @ products.T).reshape(-1, rank + 1, rank + 1) + 1e-6 * np.eye(rank + 1)
+            rows = np.linalg.solve(left, ((W * seen) @ place.T)[:, :, None])[:, :, 0]
+            found = cls(rows[:, :rank], rows[:, rank])
+        return found
+
+    @property
+    def rank(self) -> int:
+        """Dimensions."""
+        return self.directions.shape[1]
+
+    def distance(self, W: Array, seen: Array) -> Array:
+        """How far each trajectory (2F, P) is from the subspace.
+
+        Returns
+        -------
+        (P,) float
+            Root of the mean square distance per frame, pixels, with the degrees of freedom that the point
+            itself spends taken off; 0 where it has no more measurements than those.
+        """
+        error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
+        free = np.maximum((seen.sum(axis=0) - self.rank) / 2, 0.5)
         return np.asarray(np.sqrt((error**2).sum(axis=0) / free))
-    tiny = 1e-6 * np.eye(rank)
-    for _ in range(iterations):
-        M, mu = basis[:, :rank], basis[:, rank]
-        scale = max(float(np.einsum("ij,ij->", M, M)) / rank, 1e-9)
-        left = np.einsum("ra,rb,rp->pab", M, M, seen) + scale * tiny
-        right = np.einsum("ra,rp->pa", M, (W - mu[:, None]) * seen)
-        shape = np.linalg.solve(left, right[:, :, None])[:, :, 0]
-        extended = np.column_stack([shape, np.ones(points)])
-        left = np.einsum("pa,pb,rp->rab", extended, extended, seen) + 1e-6 * np.eye(rank + 1)
-        right = np.einsum("pa,rp->ra", extended, W * seen)
-        basis = np.linalg.solve(left, right[:, :, None])[:, :, 0]
-    error = (W - basis @ extended.T) * seen
-    return np.asarray(np.sqrt((error**2).sum(axis=0) / free))
+
+    def _coordinates(self, W: Array, seen: Array) -> Array:
+        """Coordinates (rank, P) of the nearest points of the subspace."""
+        M, rank = self.directions, self.rank
+        products = (M[:, :, None] * M[:, None]).reshape(len(M), -1)
+        left = (seen.T @ products).reshape(seen.shape[1], rank, rank)
+        size = np.einsum("paa->p", left) + 1e-9
+        left = left + (1e-6 * size)[:, None, None] * np.eye(rank)
+        right = ((W - self.mean[:, None]) * seen).T @ M
+        return np.asarray(np.linalg.solve(left, right[:, :, None])[:, :, 0].T)
 
 
 def along_mean_path(W: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,14 +7,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
-from ifsvideo.segmentation.agglomeration import Agglomeration, Group
+from ifsvideo.segmentation.agglomeration import Agglomeration
 from ifsvideo.segmentation.assignment import assign, residuals
 from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.cues import Cues, Group
 from ifsvideo.segmentation.epipolar import epipolar_support
 from ifsvideo.segmentation.merging import merge_by_shear
 from ifsvideo.segmentation.refinement import refine
 from ifsvideo.segmentation.sampling import sample_models
+from ifsvideo.segmentation.similarity import learnt
 from ifsvideo.segmentation.world import static_evidence
 from ifsvideo.types import BACKGROUND, UNDECIDED, Segmentation, Tracks
 
@@ -95,9 +98,10 @@ class IFSSegmenter:
             confidence = np.ones(tracks.points)
             details["scores"] = scores
         else:
-            merging = Agglomeration(tracks, anchor, evidence, tolerance, unit, config)
+            cues = Cues(tracks, anchor, evidence, unit, config.pairs)
+            merging = Agglomeration(cues, learnt())
             found = merging.run(segments, fit < config.outlier_cost, motions)
-            labels, confidence = _label_groups(found, tracks.points, anchor, size, config, motions)
+            labels, confidence = _label_groups(found, merging, size, config, motions)
             details["merges"] = merging.merges
         details |= {"fit": fit, "evidence": evidence}
         return Segmentation(labels, background, segments, confidence, details)
@@ -146,26 +150,26 @@ def _background_first(
 
 def _label_groups(
     groups: list[Group],
-    points: int,
-    anchor: NDArray[np.float64],
+    merging: Agglomeration,
     size: tuple[int, int],
     config: SegmenterConfig,
     motions: int | None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Labels and confidence of all points: 0 for what stands still, 1, 2, ... for the rest by size."""
-    labels = np.zeros(points, dtype=np.int64)
-    confidence = np.zeros(points)
-    claims = [(1 - g.moving) * _spread(anchor[g.members], size) for g in groups]
-    still = int(np.argmax(claims))
-    order = sorted((k for k in range(len(groups)) if k != still), key=lambda k: -len(groups[k].members))
+    """Labels and confidence of all points: 0 for the static world, 1, 2, ... for the rest by size."""
+    anchor = merging.cues.anchor
+    labels = np.full(len(anchor), BACKGROUND, dtype=np.int64)
+    claims = [_spread(anchor[g.members], size) / (1 + g.evidence**2) for g in groups]
+    still = groups.pop(int(np.argmax(claims)))
+    confidence = np.ones(len(anchor))
     number = 0
-    for k in [still, *order]:
-        group = groups[k]
-        confidence[group.members] = abs(2 * group.moving - 1)
-        small = len(group.members) < config.least_points
-        if k == still or (motions is None and (small or group.moving < 0.5)):
-            labels[group.members] = BACKGROUND
+    for group in sorted(groups, key=lambda g: -len(g.members)):
+        apart = merging.apart(group, still)
+        count = len(group.members)
+        needed = expit(config.least_odds + config.few_points_doubt / count)
+        if motions is None and (count < config.least_points or apart < needed):
+            confidence[group.members] = 1 - apart
         else:
             number += 1
             labels[group.members] = number
+            confidence[group.members] = apart
     return labels, confidence

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from ifsvideo.segmentation.refinement import delaunay_edges
 from ifsvideo.types import Tracks
@@ -49,14 +50,18 @@ def inside_edges(anchor: NDArray[np.float64], members: NDArray[np.int64]) -> NDA
 def between_edges(
     anchor: NDArray[np.float64], first: NDArray[np.int64], second: NDArray[np.int64], pairs: int
 ) -> NDArray[np.int64]:
-    """Greedy one-to-one assignment of the ``pairs`` nearest points of two segments: indices of points (E,
-    2)."""
-    distance = np.linalg.norm(anchor[first][:, None] - anchor[second][None], axis=2)
-    chosen: list[tuple[int, int]] = []
-    for flat in np.argsort(distance, axis=None, kind="stable"):
-        i, j = divmod(int(flat), len(second))
-        if all(i != a and j != b for a, b in chosen):
-            chosen.append((i, j))
-            if len(chosen) == min(pairs, len(first), len(second)):
-                break
-    return np.array([(first[i], second[j]) for i, j in chosen], dtype=np.int64).reshape(-1, 2)
+    """Greedy one-to-one assignment of the ``pairs`` nearest points of two segments.
+
+    Returns
+    -------
+    (E, 2) int
+        Indices of points, nearest first.
+    """
+    left = cdist(anchor[first], anchor[second])
+    chosen = np.empty((min(pairs, len(first), len(second)), 2), dtype=np.int64)
+    for edge in chosen:
+        i, j = divmod(int(left.argmin()), len(second))
+        edge[:] = first[i], second[j]
+        left[i] = np.inf
+        left[:, j] = np.inf
+    return chosen
