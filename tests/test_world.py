@@ -15,10 +15,10 @@ FORWARD = Camera.path(step=(0, 0, 0.3))
 
 def evidence_of(scene: Scene) -> np.ndarray:
     threshold = SegmenterConfig().evidence_threshold
-    evidence, tolerance, world = static_evidence(scene.tracks, SIZE, threshold, np.random.default_rng(0))
+    evidence, world = static_evidence(scene.tracks, SIZE, threshold, np.random.default_rng(0))
     assert world is not None
-    assert evidence.shape == tolerance.shape == (scene.tracks.points,)
-    assert (tolerance > 0).all()
+    assert evidence.shape == world.tolerance.shape == (scene.tracks.points,)
+    assert (world.tolerance > 0).all()
     return evidence
 
 
@@ -101,19 +101,20 @@ def test_the_size_of_the_picture_does_not_matter() -> None:
     scene = make_scene(FORWARD, (LEFT_CAR,))
     large = Tracks.from_array(scene.tracks.xy * 3 + 1)
     threshold = SegmenterConfig().evidence_threshold
-    small, tolerance, _ = static_evidence(scene.tracks, SIZE, threshold, np.random.default_rng(0))
-    other, wider, _ = static_evidence(large, (1920, 1440), threshold, np.random.default_rng(0))
-    assert wider == pytest.approx(3 * tolerance, rel=1e-3)
+    small, world = static_evidence(scene.tracks, SIZE, threshold, np.random.default_rng(0))
+    other, wider = static_evidence(large, (1920, 1440), threshold, np.random.default_rng(0))
+    assert world is not None
+    assert wider is not None
+    assert wider.tolerance == pytest.approx(3 * world.tolerance, rel=1e-3)
     assert ((small > 1) == (other > 1)).mean() > 0.98
 
 
 def test_too_few_points_say_nothing() -> None:
     scene = make_scene(static=7)
     assert fit_world(scene.tracks, SIZE, np.random.default_rng(0)) is None
-    evidence, tolerance, world = static_evidence(scene.tracks, SIZE, 5.0, np.random.default_rng(0))
+    evidence, world = static_evidence(scene.tracks, SIZE, 5.0, np.random.default_rng(0))
     assert world is None
     assert not evidence.any()
-    assert (tolerance > 0).all()
 
 
 def test_points_that_share_no_frames_say_nothing() -> None:
@@ -130,7 +131,7 @@ def test_a_point_without_two_key_frames_has_no_evidence() -> None:
     assert world is not None
     assert np.isnan(world.rms[:2]).all()
     assert np.isfinite(world.rms[2:]).all()
-    evidence, _, _ = static_evidence(Tracks.from_array(xy), SIZE, 5.0, np.random.default_rng(0))
+    evidence, _ = static_evidence(Tracks.from_array(xy), SIZE, 5.0, np.random.default_rng(0))
     assert not evidence[:2].any()
     assert np.isfinite(evidence).all()
 
@@ -144,7 +145,7 @@ def test_few_frames(frames: int) -> None:
 @pytest.mark.parametrize("value", [0.0, 100.0])
 def test_points_that_all_share_a_place(value: float) -> None:
     tracks = Tracks.from_array(np.full((10, 20, 2), value))
-    evidence, _, _ = static_evidence(tracks, SIZE, 5.0, np.random.default_rng(0))
+    evidence, _ = static_evidence(tracks, SIZE, 5.0, np.random.default_rng(0))
     assert (evidence < 1).all()
 
 

@@ -1,8 +1,8 @@
 """Stage 5, weighing evidence: segments merge in the order of how likely they are one motion, until none is.
 
 The thesis's predicate compares shear between two segments with shear inside them. On a road that parts a
-static scene by its depth, so shear is one cue of several here (`cues`), and a learnt rule (`similarity`) weighs
-them. They are measured anew after each merge: what many points tell is surer than what few do.
+static scene by its depth, so shear is one cue of several here (`cues`), and a learnt rule (`similarity`)
+weighs them. They are measured anew after each merge: what many points tell is surer than what few do.
 """
 
 from __future__ import annotations

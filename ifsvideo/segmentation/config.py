@@ -60,8 +60,8 @@ class SegmenterConfig:
     iterations: int = 20
     """Iterations of TRW-S at most."""
     merging: Literal["evidence", "shear"] = "evidence"
-    """Stage 5: ``shear`` is the thesis's Algorithm 3, ``evidence`` weighs shear with cross prediction, nearness
-    and the static world."""
+    """Stage 5: ``shear`` is the thesis's Algorithm 3, ``evidence`` weighs shear with cross prediction,
+    nearness and the static world."""
     pairs: int = 10
     """Point pairs between two segments in which shear is measured."""
     shear_ratio: float = 3.0
@@ -73,10 +73,11 @@ class SegmenterConfig:
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
     least_odds: float = 0.5
-    """Log odds by which a group of points must be another motion than the background; below, it belongs to it."""
+    """Log odds by which a group of points must be another motion than the background; below, it belongs to
+    it."""
     few_points_doubt: float = 15.0
-    """The same asked on top, over the number of points: a group of five is believed at 30 to 1, one of fifty at
-    2 to 1. What slips along an edge is seldom more than a handful."""
+    """The same asked on top, over the number of points: a group of five is believed at 30 to 1, one of fifty
+    at 2 to 1. What slips along an edge is seldom more than a handful."""
 
     def __post_init__(self) -> None:
         for name, values in (("split", ("world", "epipolar")), ("merging", ("evidence", "shear"))):

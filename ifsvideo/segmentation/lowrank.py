@@ -23,8 +23,8 @@ def trajectory_matrix(tracks: Tracks) -> tuple[Array, Array]:
 class Subspace:
     """The affine subspace near which the trajectories of one body lie.
 
-    Three dimensions hold any rigid body under an affine camera (Tomasi and Kanade, IJCV 1992), two a flat one,
-    or one that moves by an affine map of the picture.
+    Three dimensions hold any rigid body under an affine camera (Tomasi and Kanade, IJCV 1992), two a flat
+    one, or one that moves by an affine map of the picture.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Subspace:
     @property
     def rank(self) -> int:
         """Dimensions."""
-        return self.directions.shape[1]
+        return int(self.directions.shape[1])
 
     def distance(self, W: Array, seen: Array) -> Array:
         """How far each trajectory (2F, P) is from the subspace.

@@ -77,7 +77,7 @@ class IFSSegmenter:
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
 
         # 1. What agrees with a static world seen by a moving camera.
-        support, evidence, tolerance, details = self._split(tracks, size, unit, rng)
+        support, evidence, details = self._split(tracks, size, unit, rng)
         background = support >= 0.5
         # 2. and 3. Affine motion models in small disks; every point to one of the nearest that explain it.
         models = sample_models(tracks, background, base, unit, config, rng)
@@ -108,14 +108,14 @@ class IFSSegmenter:
 
     def _split(
         self, tracks: Tracks, size: tuple[int, int], unit: float, rng: np.random.Generator
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
-        """Stage 1: support for the background 0..1, evidence of motion, tolerance in pixels, details."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
+        """Stage 1: support for the background 0..1, evidence of motion, details."""
         if self.config.split == "world":
-            evidence, tolerance, world = static_evidence(tracks, size, self.config.evidence_threshold, rng)
-            return 1 / (1 + evidence**2), evidence, tolerance, {"world": world}
+            evidence, world = static_evidence(tracks, size, self.config.evidence_threshold, rng)
+            return 1 / (1 + evidence**2), evidence, {"world": world}
         support = epipolar_support(tracks, self.config.epipolar_error * unit, self.seed)
         # Support of one half, the thesis's own limit, is where evidence turns.
-        return support, 2 * (1 - support), np.full(tracks.points, unit), {}
+        return support, 2 * (1 - support), {}
 
 
 def _extent(tracks: Tracks) -> tuple[int, int]:

@@ -1,7 +1,7 @@
 """How likely two segments are two motions: a logistic rule over their cues, with weights that were learnt.
 
-The weights are data, `similarity.toml`; ``python -m ifsvideo.benchmark learn`` makes them and prints what they
-reach on sequences that they were not learnt from.
+The weights are data, `similarity.toml`; ``python -m ifsvideo.benchmark learn`` makes them and prints what
+they reach on sequences that they were not learnt from.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from ifsvideo.segmentation.cues import CUES
 Array = NDArray[np.float64]
 
 WHEN = ("always", "if_one_moves", "if_both_move")
-"""Each cue has three weights: what it always tells, and what is added the surer one or both segments move. Two
-static ones at different depths shear against each other; two that move do not if they are one thing."""
+"""Each cue has three weights: what it always tells, and what is added the surer one or both segments move.
+Two static ones at different depths shear against each other; two that move do not if they are one thing."""
 
 
 def features(measured: Array) -> Array:
-    """What the rule weighs (N, 6 + 3 len(CUES)), from the columns of `ifsvideo.segmentation.cues.Cues.between`.
+    """What the rule weighs (N, 6 + 3 len(CUES)), from the columns of
+    `ifsvideo.segmentation.cues.Cues.between`.
 
     A constant, both evidences, the probabilities that one moves and that both do, their product, and every
     cue by itself and times either probability.

@@ -78,7 +78,7 @@ class World:
 
 def static_evidence(
     tracks: Tracks, size: tuple[int, int], threshold: float, rng: np.random.Generator
-) -> tuple[Array, Array, World | None]:
+) -> tuple[Array, World | None]:
     """How far each track is from a static point's way, in units of ``threshold`` times what is usual in the
     window.
 
@@ -89,17 +89,15 @@ def static_evidence(
     -------
     evidence : (P,) float
         Above 1 speaks for motion; 0 where nothing can be said.
-    tolerance : (P,) float
-        Error that a static point is granted, pixels.
     world : World or None
     """
     world = fit_world(tracks, size, rng)
     if world is None:
-        return np.zeros(tracks.points), np.full(tracks.points, NOISE * float(np.hypot(*size)) / 800), None
+        return np.zeros(tracks.points), None
     error = np.nan_to_num(world.rms / world.tolerance)
     explained = error[(error > 0) & (error < 2)]
     usual = max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
-    return error / (threshold * usual), world.tolerance, world
+    return error / (threshold * usual), world
 
 
 def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -> World | None:
