@@ -104,24 +104,44 @@ class Cues:
 
     def between(self, pairs: list[tuple[Group, Group]]) -> Array:
         """Measurements (N, 2 + len(CUES)) of pairs of groups: larger and smaller evidence, then `CUES`."""
-        return np.array([self._between(a, b) for a, b in pairs]).reshape(-1, 2 + len(CUES))
+        if not pairs:
+            return np.empty((0, 2 + len(CUES)))
+        edges = [shear.between_edges(self.anchor, a.sample, b.sample, self.pairs) for a, b in pairs]
+        measured = zip(pairs, self._shears(edges), self._gaps(edges), strict=True)
+        values = [self._between(a, b, float(between), float(gap)) for (a, b), between, gap in measured]
+        return np.asarray(np.log(np.maximum(np.array(values), 1e-3)))
 
-    def _between(self, a: Group, b: Group) -> list[float]:
+    def _shears(self, edges: list[Members]) -> Array:
+        """Shear and stretch between the groups of each pair, the typical one where no edge was ever seen."""
+        sheared, stretched = shear.shear_and_stretch(self.tracks, np.concatenate(edges))
+        both = sheared + stretched
+        first = np.cumsum([0, *map(len, edges[:-1])])
+        seen = np.add.reduceat(np.isfinite(both).sum(axis=0), first)
+        total = np.add.reduceat(np.nansum(both, axis=0), first)
+        return np.where(seen > 0, total / np.maximum(seen, 1), self.typical_inside)
+
+    def _gaps(self, edges: list[Members]) -> Array:
+        """Least distance of each pair, pixels: the edges come nearest first."""
+        nearest = np.array([pair[0] for pair in edges])
+        return np.asarray(np.linalg.norm(self.anchor[nearest[:, 0]] - self.anchor[nearest[:, 1]], axis=1))
+
+    def _between(self, a: Group, b: Group, between: float, gap: float) -> list[float]:
         large, small = (a, b) if len(a.reliable) >= len(b.reliable) else (b, a)
-        edges = shear.between_edges(self.anchor, a.sample, b.sample, self.pairs)
-        between = shear.score(self.tracks, edges)
-        if not np.isfinite(between):
-            between = self.typical_inside
         insides = [g.inside if np.isfinite(g.inside) else self.typical_inside for g in (a, b)]
-        values = (
+        return [
             max(a.evidence, b.evidence),
             min(a.evidence, b.evidence),
-            float(np.median(large.rigid[small.sample])) / self.noise,
-            float(np.median(large.affine[small.sample])) / self.noise,
+            _median(large.rigid[small.sample]) / self.noise,
+            _median(large.affine[small.sample]) / self.noise,
             between / self.unit,
             between / max(sum(insides) / 2, 0.02 * self.unit),
-            float(np.linalg.norm(self.anchor[edges[0, 0]] - self.anchor[edges[0, 1]])) / self.unit,
+            gap / self.unit,
             len(large.reliable),
             len(small.reliable),
-        )
-        return [float(np.log(max(value, 1e-3))) for value in values]
+        ]
+
+
+def _median(values: Array) -> float:
+    """Median of a few values; numpy's own spends ten times as long on its checks."""
+    ordered, middle = np.sort(values), len(values) // 2
+    return float(ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2)
