@@ -43,12 +43,7 @@ class Agglomeration:
         explained : (P,) bool
             Whether its segment's model explains the point; the others are carried along, not measured.
         """
-        parts: list[tuple[Members, Members]] = []
-        for s in range(int(segments.max(initial=-1)) + 1):
-            members = np.flatnonzero(segments == s)
-            reliable = members[explained[members]]
-            parts.append((members, reliable if len(reliable) >= 2 else members))
-        groups = dict(enumerate(self.cues.groups(parts)))
+        groups = dict(enumerate(self.cues.groups(parts_of(segments, explained))))
         apart = self._apart(groups, [(i, j) for i in groups for j in groups if i < j])
         following = len(groups)
         while apart:
@@ -71,3 +66,13 @@ class Agglomeration:
         """Probability of each pair that it is two motions."""
         measured = self.cues.between([(groups[i], groups[j]) for i, j in pairs])
         return dict(zip(pairs, self.similarity.apart(measured).tolist(), strict=True))
+
+
+def parts_of(segments: NDArray[np.int64], explained: NDArray[np.bool_]) -> list[tuple[Members, Members]]:
+    """Points of each segment, and those of them that are measured: the explained ones where there are two."""
+    parts = []
+    for s in range(int(segments.max(initial=-1)) + 1):
+        members = np.flatnonzero(segments == s)
+        reliable = members[explained[members]]
+        parts.append((members, reliable if len(reliable) >= 2 else members))
+    return parts

@@ -100,10 +100,11 @@ class IFSSegmenter:
         else:
             cues = Cues(tracks, anchor, evidence, unit, config.pairs)
             merging = Agglomeration(cues, learnt())
-            found = merging.run(segments, fit < config.outlier_cost, motions)
-            labels, confidence = _label_groups(found, merging, size, config, motions)
+            labels, confidence = merge_and_label(
+                merging, segments, fit < config.outlier_cost, size, config, motions
+            )
             details["merges"] = merging.merges
-        details |= {"fit": fit, "evidence": evidence}
+        details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
         return Segmentation(labels, background, segments, confidence, details)
 
     def _split(
@@ -146,6 +147,32 @@ def _background_first(
     order = sorted(range(count), key=lambda g: -int(members[g].sum()))
     order.sort(key=lambda g: g != int(np.argmax(claim)))
     return np.argsort(order)[groups].astype(np.int64)
+
+
+def merge_and_label(
+    merging: Agglomeration,
+    segments: NDArray[np.int64],
+    explained: NDArray[np.bool_],
+    size: tuple[int, int],
+    config: SegmenterConfig,
+    motions: int | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Stage 5, weighing evidence: from segments to labels.
+
+    Parameters
+    ----------
+    merging : Agglomeration
+        With the measurements and the rule; keeps what it merged.
+    segments, explained : (P,)
+        As of `Agglomeration.run`.
+    size : (width, height) of the picture, pixels
+
+    Returns
+    -------
+    labels : (P,) int64
+    confidence : (P,) float, 0 to 1
+    """
+    return _label_groups(merging.run(segments, explained, motions), merging, size, config, motions)
 
 
 def _label_groups(
