@@ -218,31 +218,35 @@ class Bundle:
             Jx[..., 2] = 0.0
         square = (self.rms(residual) / (width * self.tolerance)) ** 2
         weight = self.weight / (1 + square) ** 2 / self.tolerance**2 / self.freedom
-        free, points = self._free, len(e.X)
+        free, cameras = self._free, len(e.R)
         shared = 6 * len(free) + _GLOBALS
 
-        # All derivatives of a point side by side: (P, 2K, cameras and lens), (P, 2K, 3).
-        wide = np.zeros((points, len(e.R), 2, shared))
+        # A camera's unknowns touch its own measurements only: blocks (K, 6 or 2, ...) instead of one matrix.
+        by_camera, by_lens = (J.reshape(cameras, -1, J.shape[3]) for J in (Jc, Jl))
+        heavy = np.repeat(weight, 2)[None, :, None]
+        r = residual.reshape(cameras, -1, 1)
+        heavy_camera_t = (by_camera * heavy).transpose(0, 2, 1)
+        heavy_lens_t = (by_lens * heavy).transpose(0, 2, 1)
+        U = np.zeros((shared, shared))
+        blocks, beside = heavy_camera_t @ by_camera, heavy_camera_t @ by_lens
         for column, k in enumerate(free):
-            wide[:, k, :, 6 * column : 6 * column + 6] = Jc[k]
-        wide[..., -_GLOBALS:] = Jl.transpose(1, 0, 2, 3)
-        rows = wide.reshape(points, -1, shared)
-        own = Jx.transpose(1, 0, 2, 3).reshape(points, -1, 3)
-        r = residual.transpose(1, 0, 2).reshape(points, -1, 1)
-
-        weighted = rows * weight[:, None, None]
-        flat = rows.reshape(-1, shared)
-        U = weighted.reshape(-1, shared).T @ flat
-        gradient = weighted.reshape(-1, shared).T @ r.ravel()
-        U[-_GLOBALS:, -_GLOBALS:] += np.diag(1 / self.lens_spread**2)
+            rows = slice(6 * column, 6 * column + 6)
+            U[rows, rows] = blocks[k]
+            U[rows, -_GLOBALS:] = beside[k]
+            U[-_GLOBALS:, rows] = beside[k].T
+        U[-_GLOBALS:, -_GLOBALS:] = (heavy_lens_t @ by_lens).sum(axis=0) + np.diag(1 / self.lens_spread**2)
+        gradient = np.append((heavy_camera_t @ r)[free].ravel(), (heavy_lens_t @ r).sum(axis=0).ravel())
         gradient[-_GLOBALS:] += (e.lens - self.lens_prior) / self.lens_spread**2
-        own_t = own.transpose(0, 2, 1) * weight[:, None, None]
-        V = own_t @ own
+
+        own_t = (Jx * weight[:, None, None]).transpose(0, 1, 3, 2)
+        V = (own_t @ Jx).sum(axis=0)
         trace = np.einsum("paa->p", V) + 1e-12 * float(weight.max(initial=1.0))
         V = V + (1e-3 * damping * trace)[:, None, None] * np.eye(3) + 1e-12 * trace[:, None, None] * np.eye(3)
-        cross = own_t @ rows  # (P, 3, shared)
+        own_gradient = (own_t @ residual[..., None]).sum(axis=0)[:, :, 0]
+        # (P, 3, shared): points against cameras and lens.
+        with_cameras = (own_t[free] @ Jc[free]).transpose(1, 2, 0, 3).reshape(len(e.X), 3, -1)
+        cross = np.concatenate([with_cameras, (own_t @ Jl).sum(axis=0)], axis=2)
         inverse = np.linalg.inv(V)
-        own_gradient = (own_t @ r)[:, :, 0]
         eliminated = (inverse @ cross).reshape(-1, shared)
         S = U - cross.reshape(-1, shared).T @ eliminated
         S += np.diag(damping * np.diag(U) + 1e-9 * np.trace(U) / shared)
