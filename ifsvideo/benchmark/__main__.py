@@ -27,6 +27,9 @@ less than half the rows move. Mean over runs, then over clips.
 only. "Given" and "found" say so of every method.
 
 Run r uses seed S + r, for the segmenter, for its peers, and for --noise and --drop.
+
+learn --hopkins155 DIR --kt3dmoseg DIR --samples DIR --simulated N --write FILE, any of these data, learns the
+weights by which segments are merged instead, and tells what they reach; see learn --help.
 """
 
 from __future__ import annotations
@@ -34,15 +37,17 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ifsvideo.benchmark import comparison, datasets, samples, table
+from ifsvideo.benchmark import comparison, datasets, learning, learning_data, samples, table
 from ifsvideo.benchmark.comparison import Method, Trial
 from ifsvideo.benchmark.datasets import LabelledSequence
+from ifsvideo.benchmark.learning_data import Example
 from ifsvideo.benchmark.perturb import Perturbation
 from ifsvideo.benchmark.runner import IFSFactory, Report
 from ifsvideo.config import Config
@@ -57,16 +62,32 @@ read; 4 output cannot be written; 130, 143 interrupted
 """
 
 
+_LEARN = """\
+Learn the weights of stage 5, which merges segments by a logistic rule, and measure what they reach.
+
+Every sequence is taken to segments (stages 1 to 4). Segments of which at least 80 % of the labelled points
+are of one motion are merged as an oracle would, and pairs of groups on the way are what is learnt from. Then
+the whole of stage 5 runs on every sequence: with weights learnt from five other sixths of the data ("held
+out"; sequences that show the same frames are in one sixth), and with those learnt from all ("in sample").
+Error, exact count, precision and recall are counted as for the point data sets; no group of hopkins155 is
+known to be the background, so that nobody can say there what moves.
+
+--samples takes the windows of the clips, tracked by the package's own tracker; a track's motion is what the
+masks show under most of its rows there. Simulated windows have the seeds S, S + 1, ...; --only does not choose
+among them. Run r takes seed S + r to stages 1 to 4. At least one source is needed.
+"""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status, as `ifsvideo` does."""
-    options = _parser().parse_args(arguments)
+    line = list(sys.argv[1:] if arguments is None else arguments)
+    if line[:1] == ["learn"]:
+        run, options = _learn, _learning_parser().parse_args(line[1:])
+    else:
+        run, options = _measure, _parser().parse_args(line)
     signal.signal(signal.SIGTERM, _terminate)
     try:
-        _check(options)
-        if options.dataset == "samples":
-            _measure_samples(options)
-        else:
-            _measure_points(options)
+        run(options)
     except IfsVideoError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return fault.exit_status
@@ -85,12 +106,8 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("dataset", metavar="DATASET", choices=("hopkins155", "kt3dmoseg", "tracks", "samples"))
     add("folder", metavar="DIR", type=Path, help="where the data set lies")
-    add("--runs", metavar="N", type=_whole(1), default=1, help="runs of every sequence (1)")
-    add("--seed", metavar="S", type=_whole(0), default=0, help="seed of the first run (0)")
-    add("--jobs", metavar="N", type=_whole(1), default=os.cpu_count() or 1, help="processes (all CPUs)")
     add("--config", metavar="FILE", default="default", help='a TOML file, or "thesis" or "default" (default)')
-    add("--json", metavar="FILE", type=Path, help="write all figures there")
-    add("--only", metavar="NAME-GLOB", default="*", help="only sequences with such a name")
+    _add_common(parser)
     points = parser.add_argument_group("of hopkins155, kt3dmoseg and tracks only")
     add = points.add_argument
     add("--motions-known", action="store_true", help="tell the segmenter the number of motions")
@@ -113,6 +130,32 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--show", metavar="NAME", help="with --plot: draw the stages of this sequence, too")
     add("--verbose", action="store_true", help="a line for each sequence of hopkins155, too")
+    return parser
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    """The options of every command."""
+    add = parser.add_argument
+    add("--runs", metavar="N", type=_whole(1), default=1, help="runs of every sequence (1)")
+    add("--seed", metavar="S", type=_whole(0), default=0, help="seed of the first run (0)")
+    add("--jobs", metavar="N", type=_whole(1), default=os.cpu_count() or 1, help="processes (all CPUs)")
+    add("--json", metavar="FILE", type=Path, help="write all figures there")
+    add("--only", metavar="NAME-GLOB", default="*", help="only sequences with such a name")
+
+
+def _learning_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m ifsvideo.benchmark learn",
+        description=_LEARN,
+        epilog=_STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    for source in ("hopkins155", "kt3dmoseg", "samples"):
+        add(f"--{source}", metavar="DIR", type=Path, help="learn from it; where it lies")
+    add("--simulated", metavar="N", type=_whole(1), help="learn from so many simulated windows")
+    add("--write", metavar="FILE", type=Path, help="write the weights there, as similarity.toml has them")
+    _add_common(parser)
     return parser
 
 
@@ -173,6 +216,15 @@ def _need_matplotlib() -> None:
         raise UsageError("--plot needs matplotlib; install it by: pip install 'ifsvideo[plot]'") from None
 
 
+def _measure(options: argparse.Namespace) -> None:
+    """Measure the segmenter, or the pipeline, on one data set."""
+    _check(options)
+    if options.dataset == "samples":
+        _measure_samples(options)
+    else:
+        _measure_points(options)
+
+
 def _measure_samples(options: argparse.Namespace) -> None:
     chosen = samples.clips(options.folder, options.only)
     factory = samples.PipelineFactory(_configuration(options.config))
@@ -204,6 +256,51 @@ def _measure_points(options: argparse.Namespace) -> None:
         _draw(options.plot, report, shown, own, trial)
 
 
+def _learn(options: argparse.Namespace) -> None:
+    """Learn the weights of stage 5; they are written only once everything is done."""
+    for target in (options.write, options.json):
+        if target:
+            check_writable(target)
+    examples = _examples(options)
+    rule, scores = learning.learn(examples, options.runs, options.seed, options.jobs)
+    command = _command_of(options)
+    print(learning.table(scores))
+    if options.write:
+        _write_text(options.write, learning.as_toml(rule, command))
+        print(f"wrote {options.write}")
+    if options.json:
+        _write(options.json, {"command": command, **scores})
+
+
+def _examples(options: argparse.Namespace) -> list[Example]:
+    """The sequences of every source that was named."""
+    found: list[Example] = []
+    for dataset in ("hopkins155", "kt3dmoseg"):
+        if folder := vars(options)[dataset]:
+            found += learning_data.of_points(dataset, folder, options.only)
+    if options.samples:
+        found += learning_data.of_samples(options.samples, Config(), options.only, options.jobs)
+    if options.simulated:
+        # Imported here because no other command needs it.
+        from ifsvideo.benchmark.simulation import simulate
+
+        found += learning_data.of_simulation(simulate, options.simulated, options.seed, options.jobs)
+    if not found:
+        raise UsageError("nothing to learn from; name --hopkins155, --kt3dmoseg, --samples or --simulated")
+    return found
+
+
+def _command_of(options: argparse.Namespace) -> str:
+    """The command that learns the same, with DIR for the places of one machine."""
+    words = ["python -m ifsvideo.benchmark learn"]
+    words += [f"--{name} DIR" for name in ("hopkins155", "kt3dmoseg", "samples") if vars(options)[name]]
+    if options.simulated:
+        words.append(f"--simulated {options.simulated}")
+    if options.only != "*":
+        words.append(f"--only {shlex.quote(options.only)}")
+    return " ".join([*words, f"--runs {options.runs} --seed {options.seed}"])
+
+
 def _draw(folder: Path, report: Report, shown: LabelledSequence | None, method: Method, trial: Trial) -> None:
     # Imported here because matplotlib is an extra.
     from ifsvideo.benchmark import plots, plots_sequence
@@ -232,10 +329,15 @@ def _configuration(name: str) -> Config:
 
 
 def _write(path: Path, report: Report) -> None:
-    """Write the report as JSON; an older file stands until the new one is complete."""
+    """Write the report as JSON."""
+    _write_text(path, json.dumps(report, indent=1, allow_nan=False) + "\n")
+
+
+def _write_text(path: Path, text: str) -> None:
+    """Write a file; an older one stands until the new one is complete."""
     with replacing(path) as part:
         try:
-            part.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            part.write_text(text, encoding="utf-8")
         except OSError as fault:
             raise output_error(path, fault) from fault
 
