@@ -73,8 +73,8 @@ Error, exact count, precision and recall are counted as for the point data sets;
 known to be the background, so that nobody can say there what moves.
 
 --samples takes the windows of the clips, tracked by the package's own tracker; a track's motion is what the
-masks show under most of its rows there. Simulated windows have the seeds S, S + 1, ...; --only does not choose
-among them. Run r takes seed S + r to stages 1 to 4. At least one source is needed.
+masks show under most of its rows there. Simulated windows have the seeds S, S + 1, ...; --only does not
+choose among them. Run r takes seed S + r to stages 1 to 4. At least one source is needed.
 """
 
 

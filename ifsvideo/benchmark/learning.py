@@ -144,13 +144,13 @@ def learn(
     """
     config = SegmenterConfig()
     tasks = [Task(example, config, seed + run) for example in examples for run in range(runs)]
-    prepared = in_processes(prepare, tasks, jobs, quiet, "stages 1 to 4")
-    pairs = [found for _, found in prepared]
     importance = [SOURCE_WEIGHTS[task.example.source] for task in tasks]
     folds = folds_of([example.group for example in examples], seed)
     fold = [folds[task.example.group] for task in tasks]
     if len(set(fold)) < 2:
         raise InputError("too few sequences to judge by: all show the same scene; give another one, too")
+    prepared = in_processes(prepare, tasks, jobs, quiet, "stages 1 to 4")
+    pairs = [found for _, found in prepared]
 
     def without(held_out: int | None) -> Similarity:
         chosen = [k for k in range(len(tasks)) if fold[k] != held_out]
