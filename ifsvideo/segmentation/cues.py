@@ -126,7 +126,8 @@ class Cues:
         return np.asarray(np.linalg.norm(self.anchor[nearest[:, 0]] - self.anchor[nearest[:, 1]], axis=1))
 
     def _between(self, a: Group, b: Group, between: float, gap: float) -> list[float]:
-        large, small = (a, b) if len(a.reliable) >= len(b.reliable) else (b, a)
+        # Of two as large the one with the earlier point predicts, whichever is named first.
+        small, large = sorted((a, b), key=lambda group: (len(group.reliable), -int(group.members[0])))
         insides = [g.inside if np.isfinite(g.inside) else self.typical_inside for g in (a, b)]
         return [
             max(a.evidence, b.evidence),
