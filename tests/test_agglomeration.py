@@ -9,6 +9,7 @@ from ifsvideo.segmentation.agglomeration import Agglomeration, parts_of
 from ifsvideo.segmentation.cues import CUES, Cues
 from ifsvideo.segmentation.similarity import Similarity, feature_names, learnt
 from ifsvideo.segmentation.world import static_evidence
+from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, Mover, Scene, make_scene
 
 
@@ -73,9 +74,8 @@ def test_merging_starts_with_the_likeliest_and_stops_at_one_half() -> None:
     place = np.array([0.0, 100.0, 130.0, 240.0])
     x = (place[:, None] + [-5.0, 0.0, 5.0]).ravel()
     xy = np.stack([x, np.tile([0.0, 1.0, 0.0], 4)], axis=1)[None] + np.zeros((4, 1, 1))
-    scene = Scene(make_scene(static=12).tracks.from_array(xy), np.zeros(12, np.int64), Camera.path(4), xy)
     near = rule(gap_always=2.0, constant=-2 * np.log(60))
-    cues = Cues(scene.tracks, xy[0], np.ones(12), 1.0, 10)
+    cues = Cues(Tracks.from_array(xy), xy[0], np.ones(12), 1.0, 10)
     merging = Agglomeration(cues, near)
     groups = merging.run(np.repeat(np.arange(4), 3), np.ones(12, dtype=bool), None)
     assert [merge[:2] for merge in merging.merges] == [(1, 2)]
@@ -94,10 +94,10 @@ def test_points_that_no_model_explains_are_carried_along() -> None:
     explained[::4] = False
     xy = scene.tracks.xy.copy()
     xy[:, ::4] += np.random.default_rng(0).normal(0, 20, xy[:, ::4].shape)
-    wild = Scene(scene.tracks.from_array(xy, size=SIZE), scene.truth, scene.camera, scene.world)
-    merging = Agglomeration(start(scene).cues, learnt())
-    spoilt = Cues(wild.tracks, scene.tracks.xy[0], merging.cues.evidence, 1.0, 10)
-    groups = Agglomeration(spoilt, learnt()).run(segments, explained, None)
+    spoilt = Tracks.from_array(xy, size=SIZE)
+    evidence = start(scene).cues.evidence
+    merging = Agglomeration(Cues(spoilt, scene.tracks.xy[0], evidence, 1.0, 10), learnt())
+    groups = merging.run(segments, explained, None)
     assert len(groups) == 2
     assert sorted(np.concatenate([group.members for group in groups])) == list(range(len(segments)))
     assert all(explained[group.reliable].all() for group in groups)
