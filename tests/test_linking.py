@@ -12,7 +12,7 @@ def link(linker: Linker, labels: dict[range, int]) -> dict[range, set[int]]:
     """Link one window given as label of each range of ids; the numbers of each range."""
     ids = np.array([i for block in labels for i in block], dtype=np.int64)
     own = np.array([label for block, label in labels.items() for _ in block], dtype=np.int64)
-    number = dict(zip(ids.tolist(), linker.link(ids, own).tolist(), strict=True))
+    number = dict(zip(ids.tolist(), linker.link(ids, own, np.stack([ids, ids], axis=1)).tolist(), strict=True))
     return {block: {number[i] for i in block} for block in labels}
 
 
@@ -66,7 +66,7 @@ def test_most_tracks_in_all_keep_their_number() -> None:
     # The first label shares 5 with 1 and 4 with 2, the second 4 with 1 and none with 2.
     one = [*range(5), *range(9, 13)]
     ids = np.array([*one, 5, 6, 7, 8], dtype=np.int64)
-    found = linker.link(ids, np.repeat([1, 2], [9, 4]))
+    found = linker.link(ids, np.repeat([1, 2], [9, 4]), np.stack([ids, ids], axis=1))
     assert found.tolist() == [2] * 9 + [1] * 4
 
 
@@ -84,10 +84,11 @@ def test_a_track_counts_for_the_object_that_most_windows_gave_it_to() -> None:
     linker = Linker(3)
     few = range(5)
     link(linker, {few: 1, range(5, 10): 1, B: 2})
-    link(linker, {few: 2, range(5, 10): 1, B: 2})
-    link(linker, {few: 2, range(5, 10): 1, B: 2})
+    for _ in range(2):
+        # Too few tracks for an object of their own to be kept apart in the other.
+        link(linker, {range(2): 2, range(2, 10): 1, B: 2})
     assert linker.number_of(0) == 2
-    assert link(linker, {few: 1}) == {few: {2}}
+    assert linker.number_of(3) == 1
 
 
 def test_two_objects_taken_for_one_in_a_window_get_their_numbers_back() -> None:
@@ -116,4 +117,20 @@ def test_an_empty_window(before: bool) -> None:
     linker = Linker(3)
     if before:
         link(linker, {A: 1})
-    assert linker.link(np.empty(0, np.int64), np.empty(0, np.int64)).shape == (0,)
+    assert linker.link(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2))).shape == (0,)
+
+
+def test_objects_known_apart_are_not_made_one_by_a_window_that_mixes_them() -> None:
+    linker = Linker(3)
+    for _ in range(2):
+        link(linker, {A: 1, B: 2})
+    both = link(linker, {A: 1, B: 1, range(30, 33): 1, C: 0})
+    # New tracks take the number of the nearest that is known.
+    assert both == {A: {1}, B: {2}, range(30, 33): {2}, C: {0}}
+
+
+def test_what_fell_apart_in_a_single_window_grows_together_again() -> None:
+    linker = Linker(3)
+    link(linker, {range(20): 1})
+    link(linker, {A: 1, B: 2})
+    assert link(linker, {range(20): 1}) == {range(20): {1}}

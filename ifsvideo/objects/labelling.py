@@ -32,7 +32,7 @@ def label_clip(
     """
     bounds = window_bounds(trajectories.frames, trajectories.fps, config)
     fixed = camera_fixed_tracks(trajectories, config)
-    linker = Linker(config.least_shared)
+    linker = Linker(config.least_shared, config.least_windows)
     seen_in: Counter[int] = Counter()
     labels = np.full(len(trajectories.ids), UNDECIDED, dtype=np.int32)
     unit = float(np.hypot(*trajectories.size)) / 800 if trajectories.size else 1.0
@@ -46,7 +46,7 @@ def label_clip(
         if len(lasting):
             segmentation = segmenter.segment(tracks.select(lasting), motions)
             found = follow_neighbours(tracks, lasting, segmentation.labels, unit)
-        found = linker.link(tracks.ids, found)
+        found = linker.link(tracks.ids, found, np.nanmean(tracks.xy, axis=0))
         seen_in.update(int(number) for number in np.unique(found[found > BACKGROUND]))
         first, last = np.searchsorted(trajectories.frame, [edges[k], edges[k + 1]])
         ids = trajectories.ids[first:last]
