@@ -72,12 +72,12 @@ class SegmenterConfig:
     likely moving as not."""
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
-    least_odds: float = 0.5
-    """Log odds by which a group of points must be another motion than the background; below, it belongs to
-    it."""
-    few_points_doubt: float = 15.0
-    """The same asked on top, over the number of points: a group of five is believed at 30 to 1, one of fifty
-    at 2 to 1. What slips along an edge is seldom more than a handful."""
+    few_points_doubt: float = 25.0
+    """Log odds by which a group must be another motion than the background, over the number of its points:
+    five are believed at 150 to 1, fifty at 2 to 1. What slips along an edge is seldom more than a handful."""
+    gap: float = 50.0
+    """Distance at which what moves alike is several things, pixels: no part of a car is so far from the next.
+    Faults of tracking are spread over the picture, and each is then judged by itself."""
 
     def __post_init__(self) -> None:
         for name, values in (("split", ("world", "epipolar")), ("merging", ("evidence", "shear"))):

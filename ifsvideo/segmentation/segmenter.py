@@ -7,22 +7,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
 
 from ifsvideo.segmentation.agglomeration import Agglomeration
 from ifsvideo.segmentation.assignment import assign, residuals
+from ifsvideo.segmentation.background import background_first, merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.cues import Cues, Group
+from ifsvideo.segmentation.cues import Cues
 from ifsvideo.segmentation.epipolar import epipolar_support
 from ifsvideo.segmentation.merging import merge_by_shear
 from ifsvideo.segmentation.refinement import refine
 from ifsvideo.segmentation.sampling import sample_models
 from ifsvideo.segmentation.similarity import learnt
 from ifsvideo.segmentation.world import static_evidence
-from ifsvideo.types import BACKGROUND, UNDECIDED, Segmentation, Tracks
-
-_SPREAD_CELLS = 8
-"""The picture is divided into so many cells a side to see how widely a motion is spread."""
+from ifsvideo.types import UNDECIDED, Segmentation, Tracks
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ class IFSSegmenter:
         # 5. Merge what is one motion.
         if config.merging == "shear":
             groups, scores = merge_by_shear(tracks, segments, anchor, config.pairs, config.shear_ratio, unit)
-            labels = _background_first(groups, support, anchor, size)
+            labels = background_first(groups, support, anchor, size)
             confidence = np.ones(tracks.points)
             details["scores"] = scores
         else:
@@ -125,78 +122,3 @@ def _extent(tracks: Tracks) -> tuple[int, int]:
     low, high = np.nanmin(tracks.xy, axis=(0, 1)), np.nanmax(tracks.xy, axis=(0, 1))
     width, height = np.ceil(high - np.minimum(low, 0)) + 1
     return int(width), int(height)
-
-
-def _spread(anchor: NDArray[np.float64], size: tuple[int, int]) -> int:
-    """Cells of the picture in which points lie."""
-    cells = np.floor(anchor / np.array(size) * _SPREAD_CELLS).astype(int)
-    return len(np.unique(cells, axis=0))
-
-
-def _background_first(
-    groups: NDArray[np.int64],
-    support: NDArray[np.float64],
-    anchor: NDArray[np.float64],
-    size: tuple[int, int],
-) -> NDArray[np.int64]:
-    """Number groups so that 0 is the background: most epipolar support and widest spread; the rest by
-    size."""
-    count = int(groups.max()) + 1
-    members = [groups == g for g in range(count)]
-    claim = [support[m].mean() * _spread(anchor[m], size) for m in members]
-    order = sorted(range(count), key=lambda g: -int(members[g].sum()))
-    order.sort(key=lambda g: g != int(np.argmax(claim)))
-    return np.argsort(order)[groups].astype(np.int64)
-
-
-def merge_and_label(
-    merging: Agglomeration,
-    segments: NDArray[np.int64],
-    explained: NDArray[np.bool_],
-    size: tuple[int, int],
-    config: SegmenterConfig,
-    motions: int | None = None,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Stage 5, weighing evidence: from segments to labels.
-
-    Parameters
-    ----------
-    merging : Agglomeration
-        With the measurements and the rule; keeps what it merged.
-    segments, explained : (P,)
-        As of `Agglomeration.run`.
-    size : (width, height) of the picture, pixels
-
-    Returns
-    -------
-    labels : (P,) int64
-    confidence : (P,) float, 0 to 1
-    """
-    return _label_groups(merging.run(segments, explained, motions), merging, size, config, motions)
-
-
-def _label_groups(
-    groups: list[Group],
-    merging: Agglomeration,
-    size: tuple[int, int],
-    config: SegmenterConfig,
-    motions: int | None,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Labels and confidence of all points: 0 for the static world, 1, 2, ... for the rest by size."""
-    anchor = merging.cues.anchor
-    labels = np.full(len(anchor), BACKGROUND, dtype=np.int64)
-    claims = [_spread(anchor[g.members], size) / (1 + g.evidence**2) for g in groups]
-    still = groups.pop(int(np.argmax(claims)))
-    confidence = np.ones(len(anchor))
-    number = 0
-    for group in sorted(groups, key=lambda g: -len(g.members)):
-        apart = merging.apart(group, still)
-        count = len(group.members)
-        needed = expit(config.least_odds + config.few_points_doubt / count)
-        if motions is None and (count < config.least_points or apart < needed):
-            confidence[group.members] = 1 - apart
-        else:
-            number += 1
-            labels[group.members] = number
-            confidence[group.members] = apart
-    return labels, confidence

@@ -1,0 +1,102 @@
+"""What the groups of stage 5 are: one is the static world, the others move, or are too little to tell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.special import expit
+
+from ifsvideo.segmentation.agglomeration import Agglomeration
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.cues import Group, Members
+from ifsvideo.types import BACKGROUND
+
+_SPREAD_CELLS = 8
+"""The picture is divided into so many cells a side to see how widely a motion is spread."""
+
+
+def merge_and_label(
+    merging: Agglomeration,
+    segments: NDArray[np.int64],
+    explained: NDArray[np.bool_],
+    size: tuple[int, int],
+    config: SegmenterConfig,
+    motions: int | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Stage 5, weighing evidence: from segments to labels, 0 for the static world, 1, 2, ... by size.
+
+    Parameters
+    ----------
+    merging : Agglomeration
+        With the measurements and the rule; keeps what it merged.
+    segments, explained : (P,)
+        As of `Agglomeration.run`.
+    size : (width, height) of the picture, pixels
+
+    Returns
+    -------
+    labels : (P,) int64
+    confidence : (P,) float, 0 to 1
+    """
+    groups = merging.run(segments, explained, motions)
+    cues = merging.cues
+    labels = np.full(len(segments), BACKGROUND, dtype=np.int64)
+    confidence = np.ones(len(segments))
+    claims = [_spread(cues.anchor[g.members], size) / (1 + g.evidence**2) for g in groups]
+    still = groups.pop(int(np.argmax(claims)))
+    things: list[Members] = []
+    for group in groups:
+        parts = [group]
+        if motions is None:
+            reliable = np.zeros(len(segments), dtype=bool)
+            reliable[group.reliable] = True
+            pieces = _pieces(group.members, cues.anchor, config.gap * cues.unit)
+            parts = [_measured(merging, piece, reliable) for piece in pieces]
+        for part in parts:
+            apart, count = merging.apart(part, still), len(part.members)
+            few = count < config.least_points or apart < expit(config.few_points_doubt / count)
+            if motions is None and few:
+                confidence[part.members] = 1 - apart
+            else:
+                confidence[part.members] = apart
+                things.append(part.members)
+    for number, members in enumerate(sorted(things, key=lambda m: (-len(m), int(m[0]))), 1):
+        labels[members] = number
+    return labels, confidence
+
+
+def _pieces(members: Members, anchor: NDArray[np.float64], gap: float) -> list[Members]:
+    """Parts of a group that lie farther than ``gap`` from each other."""
+    if len(members) < 2:
+        return [members]
+    piece = fcluster(linkage(anchor[members], "single"), gap, "distance")
+    return [np.sort(members[piece == number]) for number in np.unique(piece)]
+
+
+def _measured(merging: Agglomeration, members: Members, reliable: NDArray[np.bool_]) -> Group:
+    """A part of a group as a group of its own."""
+    own = members[reliable[members]]
+    return merging.cues.group(members, own if len(own) >= 2 else members)
+
+
+def _spread(anchor: NDArray[np.float64], size: tuple[int, int]) -> int:
+    """Cells of the picture in which points lie."""
+    cells = np.floor(anchor / np.array(size) * _SPREAD_CELLS).astype(int)
+    return len(np.unique(cells, axis=0))
+
+
+def background_first(
+    groups: NDArray[np.int64],
+    support: NDArray[np.float64],
+    anchor: NDArray[np.float64],
+    size: tuple[int, int],
+) -> NDArray[np.int64]:
+    """Number groups so that 0 is the background: most epipolar support and widest spread; the rest by
+    size."""
+    count = int(groups.max()) + 1
+    members = [groups == g for g in range(count)]
+    claim = [support[m].mean() * _spread(anchor[m], size) for m in members]
+    order = sorted(range(count), key=lambda g: -int(members[g].sum()))
+    order.sort(key=lambda g: g != int(np.argmax(claim)))
+    return np.argsort(order)[groups].astype(np.int64)
