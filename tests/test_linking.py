@@ -12,7 +12,8 @@ def link(linker: Linker, labels: dict[range, int]) -> dict[range, set[int]]:
     """Link one window given as label of each range of ids; the numbers of each range."""
     ids = np.array([i for block in labels for i in block], dtype=np.int64)
     own = np.array([label for block, label in labels.items() for _ in block], dtype=np.int64)
-    number = dict(zip(ids.tolist(), linker.link(ids, own, np.stack([ids, ids], axis=1)).tolist(), strict=True))
+    linked = linker.link(ids, own, np.stack([ids, ids], axis=1))
+    number = dict(zip(ids.tolist(), linked.tolist(), strict=True))
     return {block: {number[i] for i in block} for block in labels}
 
 

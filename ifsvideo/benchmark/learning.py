@@ -22,9 +22,9 @@ from ifsvideo.benchmark.runner import Report, in_processes
 from ifsvideo.benchmark.table import align
 from ifsvideo.errors import InputError
 from ifsvideo.segmentation.agglomeration import Agglomeration
+from ifsvideo.segmentation.background import merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import CUES
-from ifsvideo.segmentation.background import merge_and_label
 from ifsvideo.segmentation.similarity import WHEN, Similarity, feature_names, features
 from ifsvideo.types import UNDECIDED
 
