@@ -218,3 +218,11 @@ def test_the_over_segmentation_keeps_motions_apart(config: SegmenterConfig) -> N
 def test_settings_that_make_no_sense_are_refused(name: str, value: Any) -> None:
     with pytest.raises(UsageError, match=rf"segmentation\.{name}"):
         replace(SegmenterConfig(), **{name: value})
+
+
+@pytest.mark.parametrize("origin", [(0, 0), (SIZE[0] / 2, SIZE[1] / 2)], ids=["corner", "middle"])
+def test_coordinates_may_count_from_the_middle_of_the_picture(origin: tuple[float, float]) -> None:
+    scene = make_scene(movers=CARS[2], seed=1)
+    xy = scene.tracks.xy - np.array(origin)
+    result = IFSSegmenter().segment(Tracks.from_array(xy, scene.tracks.visible))
+    assert share_wrong(result.labels, scene.truth) < 0.05

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -66,11 +66,10 @@ class IFSSegmenter:
 
     def _stages(self, tracks: Tracks, motions: int | None) -> Segmentation:
         config, rng = self.config, np.random.default_rng(self.seed)
-        size = tracks.size or _extent(tracks)
+        tracks, size = _in_a_picture(tracks)
         unit = float(np.hypot(*size)) / 800
-        base = int(
-            np.argmax(tracks.visible.sum(axis=1))
-        )  # with complete tracks the first frame, as in the thesis
+        # With complete tracks the first frame, as in the thesis.
+        base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
 
         # 1. What agrees with a static world seen by a moving camera.
@@ -116,9 +115,15 @@ class IFSSegmenter:
         return support, 2 * (1 - support), {}
 
 
-def _extent(tracks: Tracks) -> tuple[int, int]:
-    """Size of a picture that nobody told: what the points span, from the origin where they are on its
-    positive side."""
+def _in_a_picture(tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
+    """The tracks and the size of their picture; where nobody told it, what the points span.
+
+    It reaches to the origin where all points lie on its positive side; coordinates from the picture's middle
+    are moved there, so that the optical centre is where the camera's was.
+    """
+    if tracks.size:
+        return tracks, tracks.size
     low, high = np.nanmin(tracks.xy, axis=(0, 1)), np.nanmax(tracks.xy, axis=(0, 1))
-    width, height = np.ceil(high - np.minimum(low, 0)) + 1
-    return int(width), int(height)
+    origin = np.minimum(low, 0)
+    width, height = np.ceil(high - origin).astype(int) + 1
+    return replace(tracks, xy=tracks.xy - origin), (int(width), int(height))
