@@ -18,7 +18,7 @@ NEAREST_M = 0.1
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera path over F frames: pinhole with square pixels, principal point in the middle, one radial term.
+    """A camera path over F frames: square pixels, principal point in the middle, one radial lens term.
 
     Attributes
     ----------

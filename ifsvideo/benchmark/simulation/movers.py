@@ -10,10 +10,11 @@ import numpy as np
 from ifsvideo.benchmark.simulation.geometry import Array, Box, Scene
 from ifsvideo.benchmark.simulation.paths import drive, integral, wobble
 from ifsvideo.benchmark.simulation.scenes import clear_of
+from ifsvideo.types import Bools
 
 _ATTEMPTS = 12
 LEAST_SHIFT = 3.0
-"""Pixels by which a mover must leave, at some time of the window, the place where it would be had it stood."""
+"""Pixels by which a mover must at some time be away from where it would be had it stood."""
 _LEAST_SIDE = 12.0
 """Pixels of the smaller side of a mover's outline in the middle frame: less does not hold five tracks."""
 _HALVES = {
@@ -28,7 +29,7 @@ _MANNER_SHARES = (0.17, 0.15, 0.25, 0.17, 0.1, 0.08, 0.03, 0.05)
 
 
 def add_movers(rng: np.random.Generator, scene: Scene, wanted: int) -> Scene:
-    """The scene with up to ``wanted`` movers that are in the picture; what stands in their way is taken out."""
+    """The scene with up to ``wanted`` movers in view; what stands in their way is taken out."""
     movers: list[Box] = []
     propose = _on_table if scene.kind == "hand-held" else _on_road
     for _ in range(_ATTEMPTS * wanted):
@@ -39,7 +40,7 @@ def add_movers(rng: np.random.Generator, scene: Scene, wanted: int) -> Scene:
     return replace(scene, boxes=(*still, *movers))
 
 
-def shift_against_still(scene: Scene, places: Array, visible: Array) -> Array:
+def shift_against_still(scene: Scene, places: Array, visible: Bools) -> Array:
     """Pixels (P,) between where points (F, P, 3) are seen and where they would be, had they stood still.
 
     They stand where they were first seen; the largest distance over the frames in which they are seen.
@@ -60,7 +61,7 @@ def _fits(scene: Scene, mover: Box) -> bool:
     size = np.array(scene.camera.size)
     centre = outline.mean(axis=1)
     inside = ((centre > 0) & (centre < size)).all(axis=1)  # a NaN is not inside
-    shift = shift_against_still(scene, corners, np.isfinite(outline).all(axis=2))
+    shift = shift_against_still(scene, corners, np.asarray(np.isfinite(outline).all(axis=2)))
     sides = np.ptp(middle, axis=0)
     fills = (sides / size).min() > 0.9
     return bool(
@@ -84,14 +85,14 @@ def _on_road(rng: np.random.Generator, scene: Scene) -> Box:
     """A vehicle or a walker with one of eight manners of moving."""
     camera, frames = scene.camera, len(scene.camera.centres)
     step = 1 / scene.fps
-    time = np.arange(frames) * step
+    time = np.arange(frames, dtype=np.float64) * step
     manner = str(rng.choice(_MANNERS, p=_MANNER_SHARES))
     shares = [0.5, 0.15, 0.15, 0.0, 0.2] if manner in ("oncoming", "overtaking", "following") else None
     shape = str(rng.choice(list(_HALVES), p=shares or [0.4, 0.1, 0.1, 0.28, 0.12]))
     low, high = np.array(_HALVES[shape])
     half = low + (high - low) * rng.random(3)
     path = np.gradient(camera.centres, step, axis=0)
-    own_speed = np.hypot(path[:, 0], path[:, 2])
+    own_speed = np.asarray(np.hypot(path[:, 0], path[:, 2]), dtype=np.float64)
     speed, yaw, slip = _manner(rng, time, manner, own_speed, shape == "walker")
     place = _place_on_road(rng, scene, manner, half)
     place[1] = scene.ground - half[1]
@@ -149,7 +150,7 @@ def _on_table(rng: np.random.Generator, scene: Scene) -> Box:
     """A box that slides, turns, or both, on the ground or on any standing box that is wide enough."""
     camera, frames = scene.camera, len(scene.camera.centres)
     step = 1 / scene.fps
-    time = np.arange(frames) * step
+    time = np.arange(frames, dtype=np.float64) * step
     pixel = rng.uniform(0.15, 0.85, (1, 2)) * camera.size
     middle = frames // 2
     place = _below(scene, camera.centres[middle], camera.rays(middle, pixel)[0], middle)
@@ -160,8 +161,8 @@ def _on_table(rng: np.random.Generator, scene: Scene) -> Box:
     speed = slides * away * rng.uniform(0.03, 0.3) * np.ones(frames)
     if rng.random() < 0.3:  # pushed, or left to stop
         speed = speed * np.clip(rng.choice([-3, 3]) * (time - rng.uniform(0.2, 0.8) * time[-1]), 0, 1.5)
-    rate = turns * rng.choice([-1, 1]) * rng.uniform(0.3, 2.0)
-    yaw = rng.uniform(-np.pi, np.pi) + integral(rate + turns * wobble(rng, time, 0.2, 0.3, 2), step)
+    rate, aim = rng.choice([-1, 1]) * rng.uniform(0.3, 2.0), rng.uniform(-np.pi, np.pi)
+    yaw = aim + integral(turns * rate + turns * wobble(rng, time, 0.2, 0.3, 2), step)
     course = rng.uniform(-np.pi, np.pi) + integral(np.full(frames, rng.normal(0, 0.5)), step)
     centres = drive(speed + wobble(rng, time, 0.05, 0.5, 2) * speed, course, step) + place
     return Box(half, centres, yaw, rng.uniform(0.4, 1.0), moves=True)

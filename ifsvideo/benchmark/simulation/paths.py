@@ -9,7 +9,7 @@ from ifsvideo.benchmark.simulation.geometry import Array
 
 
 def wobble(rng: np.random.Generator, time: Array, amplitude: float, slowest: float, fastest: float) -> Array:
-    """A smooth random course (F,) around zero: four sines between two frequencies (Hz), weaker when faster."""
+    """A smooth random course (F,) around zero: four sines between two frequencies (Hz), fast ones weak."""
     frequency = np.exp(rng.uniform(np.log(slowest), np.log(fastest), 4))
     weight = rng.normal(size=4) * np.sqrt(slowest / frequency)
     phase = rng.uniform(0, 2 * np.pi, 4)
@@ -25,7 +25,7 @@ def integral(rate: Array, step: float) -> Array:
 
 
 def drive(speed: Array, heading: Array, step: float, slip: float = 0.0) -> Array:
-    """Places (F, 3) of something that goes where it heads (plus ``slip``, radians), the middle one at zero."""
+    """Places (F, 3) of what goes where it heads (plus ``slip``, radians), the middle one at zero."""
     course = heading + slip
     velocity = np.column_stack([speed * np.sin(course), np.zeros(len(speed)), speed * np.cos(course)])
     return integral(velocity, step)

@@ -149,7 +149,7 @@ def nearest_surface(scene: Scene, frame: int, rays: Array) -> tuple[Array, NDArr
 
 
 def _follow(rng: np.random.Generator, scene: Scene, found: Corners, start: int, loss: float) -> Corners:
-    """The corners that live for half of the window from ``start``: until they leave, are hidden or get lost."""
+    """The corners that live for half of the window: from ``start`` until they leave, are hidden or lost."""
     frames, points = found.visible.shape
     xy = scene.camera.project(found.places)
     edge = np.array(scene.camera.size) - 1 - _BORDER

@@ -68,7 +68,7 @@ def standing(
 
 
 def _street(rng: np.random.Generator, window: Window, kind: str) -> Scene:
-    """Road, camera at rest in a street, or a look aside while driving; the ground is at the camera's height."""
+    """Road, camera at rest in a street, or a look aside while driving; the camera's height is 0."""
     time, frames = window.time, len(window.time)
     rest, sideways = kind == "rest", kind == "sideways"
     speed = rng.choice([rng.uniform(0, 6), rng.uniform(4, 14), rng.uniform(10, 25)])

@@ -55,9 +55,9 @@ def simulate(seed: int) -> LabelledSequence:
     Returns
     -------
     LabelledSequence
-        200 to 1000 tracks, each seen in at least half of the frames; truth 1 is the static world, 2, 3, ... are
-        the movers without a gap, 0 is a false corner that belongs to neither. Its kind is that of the scene:
-        road, rest, hand-held or sideways.
+        200 to 1000 tracks, each seen in at least half of the frames; truth 1 is the static world, 2, 3, ...
+        are the movers without a gap, 0 is a false corner that belongs to neither. Its kind is that of the
+        scene: road, rest, hand-held or sideways.
     """
     return simulate_window(seed).sequence
 
@@ -73,7 +73,7 @@ def simulate_window(seed: int) -> Simulation:
 
 
 def _draw(rng: np.random.Generator, movers: int) -> tuple[Scene, Corners, Ints] | None:
-    """A scene, its corners and their labels; None where too little is seen, or no mover of those asked for."""
+    """A scene, its corners and their labels; None where too little is seen, or none of the movers."""
     scene = add_movers(rng, draw_scene(rng), movers)
     if movers and not any(box.moves for box in scene.boxes):
         return None
@@ -91,7 +91,7 @@ def _draw(rng: np.random.Generator, movers: int) -> tuple[Scene, Corners, Ints] 
 
 
 def _label(scene: Scene, corners: Corners) -> tuple[Corners, Ints]:
-    """Labels without gaps; the tracks of a mover with too few of them, or that hardly moves, are taken out."""
+    """Labels without gaps; a mover with too few tracks, or that hardly moves, loses them all."""
     labels = np.full(len(corners.owner), STATIC)
     number = STATIC
     for index, box in enumerate(scene.boxes):

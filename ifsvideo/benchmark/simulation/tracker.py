@@ -23,12 +23,13 @@ def measured(rng: np.random.Generator, exact: Array) -> Array:
     level = np.clip(np.exp(rng.normal(np.log(rng.uniform(0.08, 0.2)), 0.4, points)), 0.05, 0.4)
     level = np.where(rng.random(points) < 0.02, rng.uniform(0.6, 1.3, points), level)[:, None]
     slow, memory = rng.uniform(0, 0.5), 0.9
-    white, pulse = rng.normal(size=(2, *exact.shape))
+    white, pulse = rng.normal(size=exact.shape), rng.normal(size=exact.shape)
     pulse[1:] *= np.sqrt(1 - memory**2)
-    remembered = lfilter([1.0], [1.0, -memory], pulse, axis=0)
+    remembered = np.asarray(lfilter([1.0], [1.0, -memory], pulse, axis=0))
     noise = level * (np.sqrt(1 - slow) * white + np.sqrt(slow) * remembered)
-    angle, pace = rng.uniform(0, 2 * np.pi, points), rng.uniform(0, 0.02, points)
-    drift = (pace * (rng.random(points) < 1 / 3))[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    angle, fastest = rng.uniform(0, 2 * np.pi, points), rng.uniform(0, 0.02, points)
+    pace = np.where(rng.random(points) < 1 / 3, fastest, 0.0)
+    drift = pace[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     return np.asarray(exact + noise + np.arange(frames)[:, None, None] * drift)
 
 
