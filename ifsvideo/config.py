@@ -47,9 +47,10 @@ class TrackerConfig:
     check_interval: int = 8
     """Frames between two comparisons of a track with the patch of its birth; KLT slides by tenths of a pixel
     a frame, and to check every track in every frame would cost as much as KLT itself."""
-    min_resemblance: float = 0.8
-    """Least correlation with the patch of its birth, after an affine alignment; else the track has slid off.
-    Leaves and branches, whose parts move against each other, stay at 0.6 to 0.8 for a second."""
+    min_resemblance: float = 0.85
+    """Least correlation with the patch of its birth, after an affine alignment; else the track has slid off,
+    or rides along an object's outline over changing ground. Leaves and branches, whose parts move against
+    each other, stay at 0.6 to 0.8 for a second."""
     max_drift: float = 0.004
     """Farthest that this alignment may move a point, share of the diagonal: 3 px at 640x360."""
     margin: float = 0.01
