@@ -184,10 +184,3 @@ def test_a_subset_is_the_same_window_with_fewer_points(aside: Scene) -> None:
     some = np.array([3, 5, 40])
     part = bundle.subset(some)
     assert_allclose(part.residual(replace(e, X=e.X[some])), bundle.residual(e)[:, some])
-
-
-def test_sensitivity_is_the_shift_a_unit_of_inverse_depth_makes(aside: Scene) -> None:
-    bundle, e, h = bundle_of(aside), true_estimate(aside), 1e-6
-    shift = bundle.project(replace(e, X=e.X + np.array([0, 0, h]))).u - bundle.project(e).u
-    expected = np.sqrt((shift**2).sum(axis=2).mean(axis=0)) / h
-    assert_allclose(bundle.depth_sensitivity(e), expected, rtol=1e-4)

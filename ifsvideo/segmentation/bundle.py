@@ -187,13 +187,6 @@ class Bundle:
             damping = np.where(better, damping / 10, damping * 10)
         return e
 
-    def depth_sensitivity(self, e: Estimate) -> Array:
-        """How far the picture of a point moves per unit of rho: root of the mean square over its frames
-        (P,)."""
-        _, Jx, _ = self._derivatives(e, self.project(e))
-        square = (Jx[..., 2] ** 2).sum(axis=(0, 2))
-        return np.asarray(np.sqrt(square / np.maximum(self.seen.sum(axis=0), 1)))
-
     def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array, Array]:
         """Derivatives of the projections by camera (K, P, 2, 6), point (K, P, 2, 3), lens (K, P, 2, 2); zero
         where unseen."""

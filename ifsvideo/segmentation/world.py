@@ -40,8 +40,7 @@ START_POINTS = 150
 PARALLAX_SHARE = 0.2
 """A camera has moved, not only turned, if the points that need it to have moved weigh at least so many times
 those that do not: depth shows in many places, a thing that moves in one. More finds larger things before a
-standing camera (on Hopkins-155 the error falls from 8.7 to 7.7 % at 0.4) and takes more of a scene with
-little parallax for movers (there the right number of motions falls from 75 to 69 %)."""
+standing camera, and takes more of a scene with little parallax for movers."""
 FALLING = [16.0, 8.0, 8.0, 4.0, 4.0, 2.0, 2.0, 1.0]
 """Widths of the robust cost during a start: first everything counts, at last only what fits."""
 
@@ -61,10 +60,6 @@ class World:
         two key frames.
     tolerance : (P,) float
         What a static point is granted, pixels.
-    sensitivity : (P,) float
-        Pixels per unit of inverse depth.
-    cost : float
-        0 if every point is static, 1 if none is.
     """
 
     frames: NDArray[np.int64]
@@ -72,8 +67,6 @@ class World:
     estimate: Estimate
     rms: Array
     tolerance: Array
-    sensitivity: Array
-    cost: float
 
 
 def static_evidence(
@@ -143,15 +136,12 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     estimate = bundle.solve_points(bundle.solve(estimate, [1.0] * 6), 3)
     if not _has_moved(bundle, estimate, far):
         estimate = far
-    residual = bundle.residual(estimate)
     return World(
         frames,
         reference,
         estimate,
-        np.where(good, bundle.rms(residual) * side, np.nan),
+        np.where(good, bundle.rms(bundle.residual(estimate)) * side, np.nan),
         tolerance * side,
-        bundle.depth_sensitivity(estimate) * side,
-        bundle.cost(residual, 1.0),
     )
 
 

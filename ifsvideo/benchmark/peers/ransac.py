@@ -46,8 +46,8 @@ class RansacSubspaces(Peer):
 
     def divide(self, tracks: Tracks, motions: int, rng: np.random.Generator) -> Labels:
         """See `Peer.divide`."""
-        # Pixels, and vectors not scaled by the singular values, as the authors do it: with coordinates in
-        # [-1, 1] the mean error on Hopkins-155 is 8.5 instead of the published 9.5 %.
+        # Pixels, and vectors not scaled by the singular values, as the authors do it; with coordinates in
+        # [-1, 1] the threshold would mean something else.
         X = np.linalg.svd(tracks.W, full_matrices=False)[2][: self.dimension]
         left = np.ones(X.shape[1], dtype=bool)
         subspaces: list[Subspace] = []
