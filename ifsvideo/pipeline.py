@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ifsvideo.clip import Source, check_outputs, open_clip
+from ifsvideo.clip import Clip, Source, check_outputs, open_clip
 from ifsvideo.config import Config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, ignore_mask
@@ -22,8 +22,9 @@ from ifsvideo.objects.figure_ground import FigureGround
 from ifsvideo.objects.labelling import label_clip
 from ifsvideo.objects.numbering import settle
 from ifsvideo.output.atomic import Outputs
-from ifsvideo.output.labels import write_labels
+from ifsvideo.output.labels import LabelSink
 from ifsvideo.output.overlay import OverlayRenderer
+from ifsvideo.output.overlay_video import OverlaySink
 from ifsvideo.output.scenes import Scenes
 from ifsvideo.segmentation.segmenter import IFSSegmenter
 from ifsvideo.tracking.tracker import KltTracker
@@ -32,6 +33,7 @@ from ifsvideo.types import (
     BACKGROUND,
     UNDECIDED,
     Bools,
+    FramePoints,
     Image,
     LabelTable,
     MovingObject,
@@ -39,10 +41,11 @@ from ifsvideo.types import (
     Renderer,
     Result,
     Segmenter,
+    Sink,
     Tracker,
     VideoInfo,
 )
-from ifsvideo.video import FrameSource, VideoWriter
+from ifsvideo.video import FrameSource
 
 _Item = TypeVar("_Item")
 
@@ -139,13 +142,16 @@ class Pipeline:
             table = LabelTable(
                 trajectories.frame, trajectories.ids, trajectories.xy, found, trajectories.frames
             )
-            if video is not None and clip.frames is not None:
-                sound = clip.path if audio and clip.info.has_audio else None
-                writer = VideoWriter(video, clip.info, audio_from=sound, outputs=outputs)
-                self._draw(clip.frames, table, writer, log)
+            sinks: list[Sink] = []
             if csv is not None:
-                with log.stage("writing labels"):
-                    write_labels(csv, table, clip.info, outputs)
+                sinks.append(LabelSink(csv, outputs))
+            if video is not None:
+                sound = clip.path if audio and clip.info.has_audio else None
+                overlay = OverlaySink(video, clip.info, self.renderer, outputs, sound)
+                sinks.append(overlay)
+            self._feed(sinks, clip, table, log)
+            if video is not None:
+                log.warnings.extend(overlay.warnings)
         log.warnings[:0] = [*(clip.frames.warnings if clip.frames else ()), *_remarks(table)]
         objects = _objects(table, clip.info)
         return Result(clip.info, table, objects, video, csv, tuple(log.warnings), log.seconds)
@@ -183,12 +189,27 @@ class Pipeline:
             on_ground = check.on_ground(config.least_ground_misfit)
         return settle(points, np.where(on_ground, BACKGROUND, labels).astype(np.int32), config)
 
-    def _draw(self, source: FrameSource, table: LabelTable, writer: VideoWriter, log: _Log) -> None:
-        scenes = Scenes(table, source.info, self.config.overlay.trail_s)
-        with log.stage("drawing"), closing(source.frames()) as frames, writer:
-            for index, image in enumerate(log.each("drawing", frames, table.frames)):
-                writer.write(self.renderer.draw(image, scenes.at(index)))
-        log.warnings.extend(writer.warnings)
+    def _feed(self, sinks: Sequence[Sink], clip: Clip, table: LabelTable, log: _Log) -> None:
+        """Give every frame to every sink."""
+        if not sinks:
+            return
+        scenes = Scenes(clip.info, self.config.overlay.trail_s)
+        wanted = clip.frames is not None and any(sink.wants_image for sink in sinks)
+        pictures = clip.frames.frames() if clip.frames and wanted else _none(table.frames)
+        with log.stage("writing"), closing(pictures):
+            for frame, image in enumerate(log.each("writing", pictures, table.frames)):
+                rows = table.at(frame)
+                scene = scenes.next(FramePoints(table.ids[rows], table.xy[rows]), table.labels[rows])
+                for sink in sinks:
+                    sink.add(scene, image)
+            for sink in sinks:
+                sink.finish()
+
+
+def _none(frames: int) -> Generator[None, None, None]:
+    """No picture, for every frame."""
+    for _ in range(frames):
+        yield None
 
 
 class _Log:

@@ -315,6 +315,37 @@ class Segmenter(Protocol):
         ...
 
 
+class Sink(Protocol):
+    """Consumes what was found, frame by frame; overlay, CSV and every other output is one.
+
+    Its files belong to a group of outputs (`ifsvideo.output.atomic.Outputs`) that it is given when it is
+    made: they appear with all others of the run, or not at all. What it keeps must not grow with points x
+    frames.
+
+    Attributes
+    ----------
+    wants_image : bool
+        Whether `add` needs the picture; pictures that no sink wants are not made.
+    """
+
+    @property
+    def wants_image(self) -> bool: ...
+
+    def add(self, scene: Scene, image: Image | None) -> None:
+        """Take the next frame: every one once, in order, its labels and object numbers final.
+
+        Parameters
+        ----------
+        scene : Scene
+        image : (H, W, 3) uint8 RGB, not to be changed; None where the input is tracks, or no sink wants it.
+        """
+        ...
+
+    def finish(self) -> None:
+        """Complete the output, after the last frame; not called after a failure."""
+        ...
+
+
 class Renderer(Protocol):
     """Draws what was found."""
 

@@ -247,7 +247,8 @@ def test_a_limit_on_file_size_is_4(clip, tmp_path):
 # Runs the command, and comes to rest in the middle of the stage that is named first.
 HELD = """
 import sys, time
-from ifsvideo import cli, pipeline
+from ifsvideo import cli
+from ifsvideo.output import labels
 from ifsvideo.video import file
 stage = sys.argv.pop(1)
 def rest(*_):
@@ -256,8 +257,8 @@ def rest(*_):
     time.sleep(60)
 if stage == "reading":
     file.probe = rest
-elif stage == "writing labels":
-    pipeline.write_labels = rest
+elif stage == "finishing":
+    labels.LabelSink.finish = rest
 else:
     show = cli._Bars.show
     def hold(self, name, done, total):
@@ -270,7 +271,7 @@ sys.exit(cli.main())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("stage", ["reading", "tracking", "segmenting", "drawing", "writing labels"])
+@pytest.mark.parametrize("stage", ["reading", "tracking", "segmenting", "writing", "finishing"])
 def test_a_signal_ends_every_stage_cleanly(clip, tmp_path, stage, number):
     for name in ("out.mp4", "out.csv"):
         (tmp_path / name).write_bytes(OLD)
@@ -282,7 +283,7 @@ def test_a_signal_ends_every_stage_cleanly(clip, tmp_path, stage, number):
     with process:
         assert process.stdout is not None
         assert process.stdout.read(4) == "here"
-        if stage == "drawing":
+        if stage == "writing":
             assert len(snapshot(tmp_path)) > len(before), "the video is being written under another name"
             assert any("ffmpeg" in line for line in children_naming(str(tmp_path)))
         process.send_signal(number)

@@ -12,7 +12,7 @@ from ifsvideo.output.legend import clock, draw_legend, draw_number
 from ifsvideo.output.overlay import OverlayRenderer
 from ifsvideo.output.palette import BACKGROUND_COLOUR, ink_on, label_colour, object_colour
 from ifsvideo.output.scenes import Scenes
-from ifsvideo.types import LabelTable, Scene, VideoInfo
+from ifsvideo.types import FramePoints, Scene, VideoInfo
 
 NO_LEGEND = OverlayConfig(legend=False)
 
@@ -186,18 +186,21 @@ def test_legend_is_left_out_where_there_is_no_room():
 
 
 def test_scenes_follow_a_track_back_in_time():
-    frame = np.array([0, 0, 1, 2, 2], np.int32)
-    ids = np.array([4, 7, 7, 4, 7])
     xy = np.arange(10, dtype=np.float32).reshape(5, 2)
-    table = LabelTable(frame, ids, xy, np.array([0, 1, 1, 0, 1], np.int32), 4)
-    scenes = Scenes(table, VideoInfo(10, 10, Fraction(10), start=2.0), trail_s=0.2)
-    found = scenes.at(2)
+    scenes = Scenes(VideoInfo(10, 10, Fraction(10), start=2.0), trail_s=0.2)
+
+    def after(ids, rows, labels) -> Scene:
+        return scenes.next(FramePoints(np.array(ids, np.int64), xy[rows]), np.array(labels, np.int32))
+
+    first = after([4, 7], slice(0, 2), [0, 1])
+    after([7], slice(2, 3), [1])
+    found = after([4, 7], slice(3, 5), [0, 1])
     assert found.time_s == pytest.approx(2.2)
     np.testing.assert_array_equal(found.labels, [0, 1])
     expected = [[[0, 1], [2, 3]], [[np.nan, np.nan], [4, 5]], [[6, 7], [8, 9]]]
     np.testing.assert_array_equal(found.trails, expected)
-    assert np.isnan(scenes.at(0).trails[:2]).all()
-    assert scenes.at(3).trails.shape == (3, 0, 2)
+    assert np.isnan(first.trails[:2]).all()
+    assert after([], slice(0), []).trails.shape == (3, 0, 2)
 
 
 def test_numbers_keep_clear_of_the_legend_and_of_each_other():

@@ -11,12 +11,14 @@ import os
 import secrets
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from ifsvideo.errors import OutputError
+
+_Context = TypeVar("_Context")
 
 
 def check_writable(target: Path) -> None:
@@ -63,6 +65,7 @@ class Outputs:
     def __init__(self) -> None:
         self._staged: list[tuple[Path, Path]] = []
         self._scratch: list[Path] = []
+        self._open = ExitStack()
 
     def add(self, target: Path) -> Path:
         """Name of an empty hidden file, with the target's ending, to be written in its stead.
@@ -91,6 +94,17 @@ class Outputs:
         """Name of a hidden file on the same disk, not yet there, that is removed in the end."""
         self._scratch.append(_hidden(beside))
         return self._scratch[-1]
+
+    def enter(self, context: AbstractContextManager[_Context]) -> _Context:
+        """Enter the context of something that writes a file of this group.
+
+        It is left, with the failure if there is one, before any file is placed or removed.
+        """
+        return self._open.enter_context(context)
+
+    def text(self, target: Path) -> TextFile:
+        """An output of ASCII text, open for writing, and closed with the group."""
+        return self.enter(TextFile(target, self.add(target)))
 
     def commit(self) -> None:
         """Move every file to its place; if one cannot be moved, undo the others.
@@ -132,10 +146,65 @@ class Outputs:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
+            self._open.__exit__(kind, error, trace)
             if kind is None:
                 self.commit()
         finally:
             self.discard()
+
+
+class TextFile:
+    """A text file being written; what the system refuses becomes the one line about its target.
+
+    Parameters
+    ----------
+    target : Path
+        Named in messages.
+    unfinished : Path
+        Where it is written.
+    """
+
+    def __init__(self, target: Path, unfinished: Path) -> None:
+        self._target = target
+        self._file = unfinished.open("w", encoding="ascii", newline="")
+
+    def write(self, text: str) -> None:
+        """Append text.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written, as on a full disk.
+        """
+        try:
+            self._file.write(text)
+        except OSError as error:
+            raise output_error(self._target, error) from None
+
+    def close(self) -> None:
+        """Write what is still buffered, and close.
+
+        Raises
+        ------
+        OutputError
+            As `write`.
+        """
+        try:
+            self._file.close()
+        except OSError as error:
+            raise output_error(self._target, error) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            with suppress(OSError):  # after a failure the file goes anyway
+                self._file.close()
 
 
 @contextmanager

@@ -1,46 +1,48 @@
-"""What the renderer is told of each frame, taken from the table of labels."""
+"""What the sinks are told of each frame, with the way its points came."""
 
 from __future__ import annotations
+
+from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ifsvideo.types import LabelTable, Scene, VideoInfo
+from ifsvideo.types import FramePoints, Scene, VideoInfo
 
 
 class Scenes:
-    """The scenes of a clip.
+    """The scenes of a clip, one frame after another; only as much of the past is kept as the trails show.
 
     Parameters
     ----------
-    table : LabelTable
-        Ordered by frame, then track.
     info : VideoInfo
+        Tells the time of a frame.
     trail_s : float
         Length of the trails, seconds.
     """
 
-    def __init__(self, table: LabelTable, info: VideoInfo, trail_s: float) -> None:
-        self._table = table
+    def __init__(self, info: VideoInfo, trail_s: float) -> None:
         self._info = info
-        self._trail = 1 + max(0, round(trail_s * float(info.fps)))
+        trail = 1 + max(0, round(trail_s * float(info.fps)))
+        nothing = FramePoints(np.empty(0, np.int64), np.empty((0, 2), np.float32))
+        self._past: deque[FramePoints] = deque([nothing] * trail, maxlen=trail)
+        self._frame = 0
 
-    def at(self, frame: int) -> Scene:
-        """The scene of one frame, from 0."""
-        rows = self._table.at(frame)
-        ids = self._table.ids[rows]
-        past = range(frame - self._trail + 1, frame + 1)
-        trails = np.stack([self._position(ids, earlier) for earlier in past])
-        xy, labels = self._table.xy[rows], self._table.labels[rows]
-        return Scene(frame, self._info.time_of(frame), ids, xy, labels, trails)
+    def next(self, points: FramePoints, labels: NDArray[np.int32]) -> Scene:
+        """The scene of the next frame; its points are ordered by id."""
+        self._past.append(points)
+        trails = np.stack([_positions(points.ids, earlier) for earlier in self._past])
+        time_s = self._info.time_of(self._frame)
+        scene = Scene(self._frame, time_s, points.ids, points.xy, labels, trails)
+        self._frame += 1
+        return scene
 
-    def _position(self, ids: NDArray[np.int64], frame: int) -> NDArray[np.float32]:
-        """Where these tracks were in a frame, (N, 2); NaN where they were not seen."""
-        found = np.full((len(ids), 2), np.nan, dtype=np.float32)
-        rows = self._table.at(frame)
-        there = self._table.ids[rows]
-        if len(there):
-            place = np.minimum(np.searchsorted(there, ids), len(there) - 1)
-            same = there[place] == ids
-            found[same] = self._table.xy[rows][place[same]]
-        return found
+
+def _positions(ids: NDArray[np.int64], points: FramePoints) -> NDArray[np.float32]:
+    """Where tracks were in a frame, (N, 2); NaN where they were not seen."""
+    found = np.full((len(ids), 2), np.nan, dtype=np.float32)
+    if len(points.ids):
+        place = np.minimum(np.searchsorted(points.ids, ids), len(points.ids) - 1)
+        same = points.ids[place] == ids
+        found[same] = points.xy[place[same]]
+    return found

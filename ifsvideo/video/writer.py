@@ -117,6 +117,7 @@ class VideoWriter:
 
     def __enter__(self) -> Self:
         self._own = Outputs()
+        self._complete = False
         try:
             self._target = (self._group or self._own).add(self.path)
             # With sound, the pictures go to a file of their own first: the length is known only at the end.
@@ -160,7 +161,7 @@ class VideoWriter:
     ) -> None:
         try:
             if kind is None:
-                self._finish()
+                self.finish()
         except BaseException as failure:
             kind, error, trace = type(failure), failure, failure.__traceback__
             raise
@@ -168,8 +169,16 @@ class VideoWriter:
             self._child.stop()
             self._own.__exit__(kind, error, trace)
 
-    def _finish(self) -> None:
-        """Let ffmpeg end, add the sound, make sure that all is there."""
+    def finish(self) -> None:
+        """Let ffmpeg end, add the sound, make sure that all is there; leaving the context well does it too.
+
+        Raises
+        ------
+        OutputError
+            If ffmpeg fails, the disk is full or no frame was written.
+        """
+        if self._complete:
+            return
         with suppress(OSError):  # where ffmpeg has died, its exit status says more
             self._child.stdin.close()
         status = self._child.wait()
@@ -182,6 +191,7 @@ class VideoWriter:
         placed = count_frames(self._target)
         if placed != self.frames:  # a full disk does not always make ffmpeg fail
             raise self._failure([*self._child.printed(), f"{placed} of {self.frames} frames arrived"])
+        self._complete = True
 
     def _arguments(self) -> list[str]:
         info = self._info
