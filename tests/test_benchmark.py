@@ -18,7 +18,7 @@ import pytest
 from scipy.io import savemat
 
 from ifsvideo.benchmark import __main__ as command
-from ifsvideo.benchmark import datasets, metrics, runner, samples, table
+from ifsvideo.benchmark import datasets, metrics, options, runner, samples, table
 from ifsvideo.config import Config
 from ifsvideo.errors import IfsVideoError, InputError, OutputError, UsageError
 from ifsvideo.segmentation.config import SegmenterConfig
@@ -391,13 +391,13 @@ def test_json_keeps_its_contract(
 
 
 def test_configuration_by_name_and_by_file(tmp_path: Path) -> None:
-    assert command._configuration("default") == Config()
-    assert command._configuration("thesis") == Config(segmentation=SegmenterConfig.thesis())
+    assert options.configuration("default") == Config()
+    assert options.configuration("thesis") == Config(segmentation=SegmenterConfig.thesis())
     file = tmp_path / "mine.toml"
     file.write_text("[tracking]\nmax_points = 50\n")
-    assert command._configuration(str(file)).tracking.max_points == 50
+    assert options.configuration(str(file)).tracking.max_points == 50
     with pytest.raises(UsageError, match=r"none\.toml"):
-        command._configuration(str(tmp_path / "none.toml"))
+        options.configuration(str(tmp_path / "none.toml"))
 
 
 @pytest.mark.parametrize(
@@ -459,5 +459,5 @@ def test_a_failed_write_leaves_the_old_file_and_no_stray_one(
     out.write_text("old")
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(OutputError, match=r"scores\.json: cannot be written \(No space"):
-        command._write(out, {"dataset": "hopkins155"})
+        options.write_report(out, {"dataset": "hopkins155"})
     assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]

@@ -6,6 +6,10 @@ tracks      DIR or its subfolders hold tracks of your own, NAME.npz: xy (F, P, 2
             optional visible (F, P), labels (P,) integers: groups from 1, 0 not known; or .mat as above
 samples     DIR holds NAME.mp4 and NAME_truth.npz (masks (F, H, W) uint8: 0 background, k object k)
 
+and, with options of their own (static --help),
+
+static CLIP ...  clips in which nothing moves: how much is called moving, or not decided
+
 Scoring of hopkins155, kt3dmoseg and tracks. Error of one sequence, per cent: 100 x (1 - the greatest number
 of points that a one-to-one matching of estimated to true labels gets right / labelled points), -1 counting
 as wrong, true label 0 not counted; averaged over runs, then over sequences. Exact count: per cent of
@@ -35,32 +39,32 @@ weights by which segments are merged instead, and tells what they reach; see lea
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ifsvideo.benchmark import comparison, datasets, learning, learning_data, samples, table
+from ifsvideo.benchmark import comparison, datasets, learning, learning_data, samples, static, table
 from ifsvideo.benchmark.comparison import Method, Trial
 from ifsvideo.benchmark.datasets import LabelledSequence
 from ifsvideo.benchmark.learning_data import Example
+from ifsvideo.benchmark.options import (
+    STATUS,
+    add_config,
+    add_only,
+    add_runs,
+    configuration,
+    whole,
+    write_report,
+    write_text,
+)
 from ifsvideo.benchmark.perturb import Perturbation
 from ifsvideo.benchmark.runner import IFSFactory, Report
 from ifsvideo.config import Config
-from ifsvideo.config_file import load_config
 from ifsvideo.errors import IfsVideoError, UsageError
-from ifsvideo.output.atomic import check_writable, output_error, replacing
-from ifsvideo.segmentation.config import SegmenterConfig
-
-_STATUS = """\
-exit status: 0 done; 1 fault of the program; 2 wrong use, or --plot without matplotlib; 3 input cannot be
-read; 4 output cannot be written; 130, 143 interrupted
-"""
-
+from ifsvideo.output.atomic import check_writable
 
 _LEARN = """\
 Learn the weights of stage 5, which merges segments by a logistic rule, and measure what they reach.
@@ -83,6 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     line = list(sys.argv[1:] if arguments is None else arguments)
     if line[:1] == ["learn"]:
         run, options = _learn, _learning_parser().parse_args(line[1:])
+    elif line[:1] == ["static"]:
+        run, options = static.measure, static.parser().parse_args(line[1:])
     else:
         run, options = _measure, _parser().parse_args(line)
     signal.signal(signal.SIGTERM, _terminate)
@@ -100,14 +106,15 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m ifsvideo.benchmark",
         description=__doc__,
-        epilog=_STATUS,
+        epilog=STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("dataset", metavar="DATASET", choices=("hopkins155", "kt3dmoseg", "tracks", "samples"))
     add("folder", metavar="DIR", type=Path, help="where the data set lies")
-    add("--config", metavar="FILE", default="default", help='a TOML file, or "thesis" or "default" (default)')
-    _add_common(parser)
+    add_config(parser)
+    add_runs(parser)
+    add_only(parser)
     points = parser.add_argument_group("of hopkins155, kt3dmoseg and tracks only")
     add = points.add_argument
     add("--motions-known", action="store_true", help="tell the segmenter the number of motions")
@@ -133,41 +140,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_common(parser: argparse.ArgumentParser) -> None:
-    """The options of every command."""
-    add = parser.add_argument
-    add("--runs", metavar="N", type=_whole(1), default=1, help="runs of every sequence (1)")
-    add("--seed", metavar="S", type=_whole(0), default=0, help="seed of the first run (0)")
-    add("--jobs", metavar="N", type=_whole(1), default=os.cpu_count() or 1, help="processes (all CPUs)")
-    add("--json", metavar="FILE", type=Path, help="write all figures there")
-    add("--only", metavar="NAME-GLOB", default="*", help="only sequences with such a name")
-
-
 def _learning_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m ifsvideo.benchmark learn",
         description=_LEARN,
-        epilog=_STATUS,
+        epilog=STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     for source in ("hopkins155", "kt3dmoseg", "samples"):
         add(f"--{source}", metavar="DIR", type=Path, help="learn from it; where it lies")
-    add("--simulated", metavar="N", type=_whole(1), help="learn from so many simulated windows")
+    add("--simulated", metavar="N", type=whole(1), help="learn from so many simulated windows")
     add("--write", metavar="FILE", type=Path, help="write the weights there, as similarity.toml has them")
-    _add_common(parser)
+    add_runs(parser)
+    add_only(parser)
     return parser
-
-
-def _whole(least: int) -> Callable[[str], int]:
-    """A converter to whole numbers of at least ``least``."""
-
-    def convert(text: str) -> int:
-        if not (text.isascii() and text.isdigit()) or int(text) < least:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least {least}")
-        return int(text)
-
-    return convert
 
 
 def _sigma(text: str) -> float:
@@ -227,12 +214,12 @@ def _measure(options: argparse.Namespace) -> None:
 
 def _measure_samples(options: argparse.Namespace) -> None:
     chosen = samples.clips(options.folder, options.only)
-    factory = samples.PipelineFactory(_configuration(options.config))
+    factory = samples.PipelineFactory(configuration(options.config))
     scores = samples.run_samples(chosen, factory, options.runs, options.seed, options.jobs)
     report = {"dataset": options.dataset, "configuration": options.config, **scores}
     print(table.samples(report))
     if options.json:
-        _write(options.json, report)
+        write_report(options.json, report)
 
 
 def _measure_points(options: argparse.Namespace) -> None:
@@ -242,7 +229,7 @@ def _measure_points(options: argparse.Namespace) -> None:
         raise UsageError(
             f"--show: no sequence is called {options.show}; --verbose without --show lists their names"
         )
-    own = Method("ifsvideo", IFSFactory(_configuration(options.config).segmentation), options.motions_known)
+    own = Method("ifsvideo", IFSFactory(configuration(options.config).segmentation), options.motions_known)
     methods = [own, *(_peers() if options.peers else ())]
     trial = Trial(options.runs, options.seed, options.jobs, Perturbation(options.noise, options.drop))
     scores = comparison.compare(options.dataset, sequences, methods, trial)
@@ -251,7 +238,7 @@ def _measure_points(options: argparse.Namespace) -> None:
         report["noise_curve"] = comparison.noise_curve(sequences, methods, trial, report)
     print(table.points(report, by_sequence=options.verbose or options.dataset != "hopkins155"))
     if options.json:
-        _write(options.json, report)
+        write_report(options.json, report)
     if options.plot:
         _draw(options.plot, report, shown, own, trial)
 
@@ -266,10 +253,10 @@ def _learn(options: argparse.Namespace) -> None:
     command = _command_of(options)
     print(learning.table(scores))
     if options.write:
-        _write_text(options.write, learning.as_toml(rule, command))
+        write_text(options.write, learning.as_toml(rule, command))
         print(f"wrote {options.write}")
     if options.json:
-        _write(options.json, {"command": command, **scores})
+        write_report(options.json, {"command": command, **scores})
 
 
 def _examples(options: argparse.Namespace) -> list[Example]:
@@ -317,29 +304,6 @@ def _peers() -> list[Method]:
     from ifsvideo.benchmark.peers import PEERS, PeerFactory
 
     return [Method(name, PeerFactory(name), motions_known=True) for name in PEERS]
-
-
-def _configuration(name: str) -> Config:
-    """The configuration called ``thesis`` or ``default``, or that of a TOML file."""
-    if name == "default":
-        return Config()
-    if name == "thesis":
-        return Config(segmentation=SegmenterConfig.thesis())
-    return load_config(name)
-
-
-def _write(path: Path, report: Report) -> None:
-    """Write the report as JSON."""
-    _write_text(path, json.dumps(report, indent=1, allow_nan=False) + "\n")
-
-
-def _write_text(path: Path, text: str) -> None:
-    """Write a file; an older one stands until the new one is complete."""
-    with replacing(path) as part:
-        try:
-            part.write_text(text, encoding="utf-8")
-        except OSError as fault:
-            raise output_error(path, fault) from fault
 
 
 if __name__ == "__main__":

@@ -25,8 +25,8 @@ _TRUTH = "_truth.npz"
 class Runnable(Protocol):
     """What is measured: a `Pipeline`, or anything that runs as one."""
 
-    def run(self, source: Path) -> Result:
-        """Label the points of a video; writes nothing."""
+    def run(self, source: Path, *, start: float = 0.0, end: float | None = None) -> Result:
+        """Label the points of a video, or of a stretch of it (seconds); writes nothing."""
         ...
 
 

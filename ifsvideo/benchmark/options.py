@@ -1,0 +1,84 @@
+"""Options that several commands of the benchmark share, and what becomes of them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from ifsvideo.benchmark.runner import Report
+from ifsvideo.config import Config
+from ifsvideo.config_file import load_config
+from ifsvideo.errors import UsageError
+from ifsvideo.output.atomic import output_error, replacing
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.video import parse_time
+
+STATUS = """\
+exit status: 0 done; 1 fault of the program; 2 wrong use, or --plot without matplotlib; 3 input cannot be
+read; 4 output cannot be written; 130, 143 interrupted
+"""
+
+
+def add_runs(parser: argparse.ArgumentParser) -> None:
+    """How often, from which seed, in how many processes, and where the figures go."""
+    add = parser.add_argument
+    add("--runs", metavar="N", type=whole(1), default=1, help="runs of every sequence (1)")
+    add("--seed", metavar="S", type=whole(0), default=0, help="seed of the first run (0)")
+    add("--jobs", metavar="N", type=whole(1), default=os.cpu_count() or 1, help="processes (all CPUs)")
+    add("--json", metavar="FILE", type=Path, help="write all figures there")
+
+
+def add_only(parser: argparse.ArgumentParser) -> None:
+    """Which sequences of a data set."""
+    parser.add_argument("--only", metavar="NAME-GLOB", default="*", help="only sequences with such a name")
+
+
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """Which settings; `configuration` reads them."""
+    text = 'a TOML file, or "thesis" or "default" (default)'
+    parser.add_argument("--config", metavar="FILE", default="default", help=text)
+
+
+def configuration(name: str) -> Config:
+    """The configuration called ``thesis`` or ``default``, or that of a TOML file."""
+    if name == "default":
+        return Config()
+    if name == "thesis":
+        return Config(segmentation=SegmenterConfig.thesis())
+    return load_config(name)
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """A converter to whole numbers of at least ``least``."""
+
+    def convert(text: str) -> int:
+        if not (text.isascii() and text.isdigit()) or int(text) < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least {least}")
+        return int(text)
+
+    return convert
+
+
+def seconds(text: str) -> float:
+    """A converter of times as the command ``ifsvideo`` takes them."""
+    try:
+        return parse_time(text)
+    except UsageError as fault:
+        raise argparse.ArgumentTypeError(str(fault)) from None
+
+
+def write_report(path: Path, report: Report) -> None:
+    """Write the report as JSON."""
+    write_text(path, json.dumps(report, indent=1, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file; an older one stands until the new one is complete."""
+    with replacing(path) as part:
+        try:
+            part.write_text(text, encoding="utf-8")
+        except OSError as fault:
+            raise output_error(path, fault) from fault
