@@ -15,6 +15,7 @@ from ifsvideo.config import Config
 from ifsvideo.config_file import load_config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, parse_area
+from ifsvideo.lens import check_k1
 from ifsvideo.video import parse_time
 
 _Value = TypeVar("_Value")
@@ -156,6 +157,13 @@ def _add_finding(parser: argparse.ArgumentParser) -> None:
         help="number of motions, background included (default: found)",
     )
     finding.add_argument(
+        "--distortion",
+        type=_option(_k1),
+        metavar="K1",
+        help="radial distortion of the lens: it shows at r (1 + K1 r^2) what a pinhole camera shows at r, in "
+        "half diagonals from the picture's centre; -0.148 to 1, negative for a wide lens (default: 0)",
+    )
+    finding.add_argument(
         "--seed", type=_option(_natural), metavar="N", help="same seed, same labels (default: 0)"
     )
     finding.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings")
@@ -198,6 +206,15 @@ def _whole(text: str) -> int:
     return int(text)
 
 
+def _k1(text: str) -> float:
+    try:
+        k1 = float(text)
+    except ValueError:
+        raise UsageError(f"{text!r} is no number; write one such as -0.1") from None
+    check_k1(k1)
+    return k1
+
+
 def _natural(text: str) -> int:
     if not (text.isascii() and text.isdigit()):
         raise UsageError(f"{text!r} is not a whole number")
@@ -209,6 +226,8 @@ def _config(told: argparse.Namespace) -> Config:
     config = load_config(told.config) if told.config else Config()
     if told.max_points is not None:
         config = replace(config, tracking=replace(config.tracking, max_points=told.max_points))
+    if told.distortion is not None:
+        config = replace(config, segmentation=replace(config.segmentation, distortion=told.distortion))
     if told.seed is not None:
         config = replace(config, seed=told.seed)
     if told.no_legend:

@@ -77,13 +77,14 @@ def test_options_reach_the_configuration(tmp_path):
     mask = tmp_path / "mask.png"
     iio.imwrite(mask, np.zeros((4, 4), np.uint8))
     line = f"a.mp4 --config {settings} --seed 9 --no-legend --start 1:02.5 --end 70 --ignore 1,2,3,4"
-    told = parse(f"{line} --ignore {mask} --motions 3 --fps 30000/1001 --quiet".split())
+    told = parse(f"{line} --ignore {mask} --motions 3 --fps 30000/1001 --distortion -.1 --quiet".split())
     assert (told.config.seed, told.config.tracking.max_points, told.config.tracking.birth_interval) == (
         9,
         77,
         5,
     )
     assert told.config.overlay.legend is False
+    assert told.config.segmentation == ifsvideo.SegmenterConfig(distortion=-0.1)
     assert (told.start, told.end, told.motions, told.quiet) == (62.5, 70.0, 3, True)
     assert told.fps is not None
     assert told.fps.denominator == 1001
@@ -117,6 +118,8 @@ def test_where_things_are_written(arguments, output, labels):
         (["a.mp4", "--motions", "0"], "--motions: '0' is not a whole number of at least 1"),
         (["a.mp4", "--max-points", "many"], "'many' is not a whole number"),
         (["a.mp4", "--max-points", "999999"], "tracking.max_points must be"),
+        (["a.mp4", "--distortion", "strong"], "--distortion: 'strong' is no number"),
+        (["a.mp4", "--distortion", "-0.2"], "--distortion: k1 must be above -4/27 (-0.148) and at most 1"),
         (["a.mp4", "--seed", "1.5"], "'1.5' is not a whole number"),
         (["a.mp4", "--ignore", "1,2,3"], "'1,2,3' is no rectangle"),
         (["a.mp4", "--ignore", "1,2,0,4"], "is no rectangle"),
@@ -167,10 +170,8 @@ def test_help_shows_three_examples_first(capsys):
     examples, rest = text.split("usage:", 1)
     assert examples.startswith("examples:")
     assert len(re.findall(r"^  ifsvideo ", examples, re.MULTILINE)) == 3
-    wanted = (
-        "-o --labels --fps --start --end --max-points --motions --ignore --config --seed --no-legend --quiet"
-    )
-    for option in [*wanted.split(), "--debug", "--version"]:
+    wanted = "-o --labels --fps --start --end --max-points --motions --distortion --ignore --config --seed"
+    for option in [*wanted.split(), "--no-legend", "--quiet", "--debug", "--version"]:
         assert option in rest
 
 

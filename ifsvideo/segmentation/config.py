@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from ifsvideo.errors import UsageError
+from ifsvideo.lens import check_k1
 
 
 @dataclass(frozen=True)
@@ -15,6 +16,9 @@ class SegmenterConfig:
     Lengths are pixels of a 640x480 picture and are scaled with the diagonal of the one at hand.
     """
 
+    distortion: float = 0.0
+    """k1 of the lens, taken out of the tracks before anything else (`ifsvideo.lens` has the model): above
+    -4/27, negative for a wide lens. By default the lens bends nothing."""
     split: Literal["world", "epipolar"] = "world"
     """Stage 1: ``epipolar`` is the thesis's (fundamental matrices against the first frame), ``world`` fits
     one rigid perspective scene to all frames at once, which also sees a point behind the camera or below the
@@ -87,7 +91,7 @@ class SegmenterConfig:
                 )
         for entry in fields(self):
             value = getattr(self, entry.name)
-            if isinstance(value, bool | str):
+            if isinstance(value, bool | str) or entry.name == "distortion":
                 continue
             if not 0 <= value < float("inf"):
                 raise UsageError(f"segmentation.{entry.name} must not be negative, got {value}")
@@ -103,6 +107,7 @@ class SegmenterConfig:
         ):
             if not getattr(self, name) > 0:
                 raise UsageError(f"segmentation.{name} must be positive, got {getattr(self, name)}")
+        check_k1(self.distortion, "segmentation.distortion")
         if self.foreground_share > 1:
             raise UsageError(f"segmentation.foreground_share must be at most 1, got {self.foreground_share}")
 

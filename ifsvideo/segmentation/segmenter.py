@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.lens import undistort
 from ifsvideo.segmentation.agglomeration import Agglomeration
 from ifsvideo.segmentation.assignment import assign, residuals
 from ifsvideo.segmentation.background import background_first, merge_and_label
@@ -67,6 +68,8 @@ class IFSSegmenter:
     def _stages(self, tracks: Tracks, motions: int | None) -> Segmentation:
         config, rng = self.config, np.random.default_rng(self.seed)
         tracks, size = _in_a_picture(tracks)
+        if config.distortion:
+            tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
         unit = float(np.hypot(*size)) / 800
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
