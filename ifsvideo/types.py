@@ -86,6 +86,15 @@ class FramePoints:
         if self.xy.shape != (len(self.ids), 2):
             raise ValueError(f"expected xy of shape ({len(self.ids)}, 2), got {self.xy.shape}")
 
+    def positions(self, ids: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Where some tracks are, (M, 2); NaN where one is not seen. These points must be ordered by id."""
+        found = np.full((len(ids), 2), np.nan, dtype=np.float32)
+        if len(self.ids):
+            place = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)
+            same = self.ids[place] == ids
+            found[same] = self.xy[place[same]]
+        return found
+
 
 @dataclass(frozen=True)
 class Tracks:

@@ -52,7 +52,7 @@ def outlines(xy: Floats, reach: float, margin: float) -> list[NDArray[np.float32
     """
     if len(xy) == 0:
         return []
-    group = _groups(xy, reach)
+    group = groups(xy, reach)
     sizes = np.bincount(group)
     kept = np.flatnonzero(sizes >= max(2.0, 0.1 * len(xy)))
     if len(kept) == 0:
@@ -61,8 +61,8 @@ def outlines(xy: Floats, reach: float, margin: float) -> list[NDArray[np.float32
     return [_rounded_hull(xy[group == index], margin) for index in order]
 
 
-def _groups(xy: Floats, reach: float) -> NDArray[np.intp]:
-    """Number of the connected group of each point."""
+def groups(xy: Floats, reach: float) -> NDArray[np.intp]:
+    """Number (N,) of the group of each point (N, 2), linked as `outlines` says; N is at least 1."""
     count = min(_NEIGHBOURS, len(xy) - 1)
     if count < 1:
         return np.zeros(len(xy), dtype=np.intp)

@@ -31,18 +31,8 @@ class Scenes:
     def next(self, points: FramePoints, labels: NDArray[np.int32]) -> Scene:
         """The scene of the next frame; its points are ordered by id."""
         self._past.append(points)
-        trails = np.stack([_positions(points.ids, earlier) for earlier in self._past])
+        trails = np.stack([earlier.positions(points.ids) for earlier in self._past])
         time_s = self._info.time_of(self._frame)
         scene = Scene(self._frame, time_s, points.ids, points.xy, labels, trails)
         self._frame += 1
         return scene
-
-
-def _positions(ids: NDArray[np.int64], points: FramePoints) -> NDArray[np.float32]:
-    """Where tracks were in a frame, (N, 2); NaN where they were not seen."""
-    found = np.full((len(ids), 2), np.nan, dtype=np.float32)
-    if len(points.ids):
-        place = np.minimum(np.searchsorted(points.ids, ids), len(points.ids) - 1)
-        same = points.ids[place] == ids
-        found[same] = points.xy[place[same]]
-    return found
