@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ifsvideo.types import BACKGROUND, Bools, Image, Ints, Scene, VideoInfo
+from ifsvideo.objects.boxes import point_box, steady_boxes
+from ifsvideo.objects.contact import contact, stretch
+from ifsvideo.objects.kinematics import steps, velocity
+from ifsvideo.types import BACKGROUND, Bools, FramePoints, Image, Ints, Scene, VideoInfo
 
 _THUMBNAIL = 160
 """Longer side of a thumbnail, pixels: a table's row on a screen of twice the usual density."""
@@ -70,6 +73,13 @@ class ObjectTable:
         if (np.diff(self.frame) < 0).any():
             raise ValueError("rows must be ordered by frame")
 
+    @classmethod
+    def empty(cls) -> ObjectTable:
+        """A table without a row."""
+        columns = [np.empty(0, np.float32) for _ in range(len(fields(cls)) - 4)]
+        whole = np.empty(0, np.int32)
+        return cls(whole, np.empty(0, np.float64), whole, whole, *columns)
+
     def __len__(self) -> int:
         return len(self.frame)
 
@@ -109,12 +119,27 @@ class Event:
     text: str
 
 
+@dataclass(frozen=True)
+class _Sight:
+    """What is measured of one object in one frame; steps and stretch are those since the frame before."""
+
+    frame: int
+    time_s: float
+    points: int
+    box: NDArray[np.float64]
+    own: NDArray[np.float64]
+    around: NDArray[np.float64]
+    stretch: NDArray[np.float64]
+
+
 class ObjectHistory:
     """Gathers what every object does (a `Sink`); memory grows with objects x frames, not with points.
 
     Parameters
     ----------
     info : VideoInfo
+    thumbnails : bool, optional
+        Whether a picture of every object is kept; frames are wanted only then.
 
     Attributes
     ----------
@@ -129,63 +154,92 @@ class ObjectHistory:
     table: ObjectTable
     events: tuple[Event, ...]
 
-    def __init__(self, info: VideoInfo) -> None:
+    def __init__(self, info: VideoInfo, *, thumbnails: bool = False) -> None:
+        self.wants_image = thumbnails
+        self.thumbnails: dict[int, Image] = {}
         self._info = info
-        self._rows: list[tuple[float, ...]] = []
-        self._thumbnails: dict[int, Image] = {}
+        self._diagonal = float(np.hypot(info.width, info.height))
+        self._before = FramePoints(np.empty(0, np.int64), np.empty((0, 2), np.float32))
+        self._sights: dict[int, list[_Sight]] = {}
         self._extent: dict[int, float] = {}
 
-    @property
-    def thumbnails(self) -> Mapping[int, Image]:
-        """See the class."""
-        return self._thumbnails
-
     def add(self, scene: Scene, image: Image | None) -> None:
-        """Take the next frame."""
+        """See `ifsvideo.types.Sink`."""
+        before = self._before.positions(scene.ids)
+        known = np.isfinite(before).all(axis=1)
+        ground = known & (scene.labels == BACKGROUND)
         for number in np.unique(scene.labels[scene.labels > BACKGROUND]).tolist():
-            xy = scene.xy[scene.labels == number]
-            left, top = xy.min(axis=0).tolist()
-            width, height = np.ptp(xy, axis=0).tolist()
-            self._rows.append((scene.frame, scene.time_s, number, len(xy), left, top, width, height))
-            if image is not None:
-                self._keep_thumbnail(number, (left, top, width, height), image)
+            on_it = scene.labels == number
+            both = on_it & known
+            own, around = steps(before[both], scene.xy[both], before[ground], scene.xy[ground])
+            sight = _Sight(
+                scene.frame,
+                scene.time_s,
+                int(np.count_nonzero(on_it)),
+                point_box(scene.xy[on_it], self._diagonal),
+                own,
+                around,
+                stretch(before[both], scene.xy[both]),
+            )
+            self._sights.setdefault(number, []).append(sight)
+            if image is not None and self.wants_image:
+                self._keep_thumbnail(number, sight.box, image)
+        self._before = FramePoints(scene.ids, scene.xy)
 
     def finish(self) -> None:
         """Make the table and the events."""
-        frame, time_s, number, points, left, top, width, height = (
-            np.array(self._rows, np.float64).reshape(-1, 8).T
-        )
-        unknown = np.full(len(frame), np.nan, np.float32)
-        self.table = ObjectTable(
-            frame.astype(np.int32),
-            time_s,
-            number.astype(np.int32),
-            points.astype(np.int32),
-            left.astype(np.float32),
-            top.astype(np.float32),
-            width.astype(np.float32),
-            height.astype(np.float32),
-            cx=(left + width / 2).astype(np.float32),
-            cy=(top + height / 2).astype(np.float32),
-            vx=unknown,
-            vy=unknown,
-            scale_rate=unknown,
-            ttc_s=unknown,
-            ttc_confidence=np.zeros(len(frame), np.float32),
-        )
+        self.table = _joined(self._rows(number, sights) for number, sights in self._sights.items())
         self.events = ()
 
-    def _keep_thumbnail(self, number: int, box: tuple[float, ...], image: Image) -> None:
-        left, top, width, height = box
-        if width * height <= _BETTER * self._extent.get(number, 0.0):
+    def _rows(self, number: int, sights: list[_Sight]) -> ObjectTable:
+        """The table of one object."""
+        fps = float(self._info.fps)
+        frame = np.array([sight.frame for sight in sights], np.int32)
+        own, around, stretched, boxes = (
+            np.array([getattr(sight, name) for sight in sights])
+            for name in ("own", "around", "stretch", "box")
+        )
+        # Seen again after a gap, its points may have been seen in the frame before as another's.
+        again = np.diff(frame, prepend=-2) > 1
+        for steps_since in (own, around, stretched):
+            steps_since[again] = np.nan
+        size = (self._info.width, self._info.height)
+        left, top, right, bottom = steady_boxes(boxes, own, stretched[:, 0], fps, size).T
+        vx, vy = velocity(own, around, fps).T
+        nearing = contact(stretched, fps)
+        box = (left, top, right - left, bottom - top, (left + right) / 2, (top + bottom) / 2)
+        measures = (*box, vx, vy, nearing.scale_rate, nearing.ttc_s, nearing.confidence)
+        return ObjectTable(
+            frame,
+            np.array([sight.time_s for sight in sights]),
+            np.full(len(sights), number, np.int32),
+            np.array([sight.points for sight in sights], np.int32),
+            *(measure.astype(np.float32) for measure in measures),
+        )
+
+    def _keep_thumbnail(self, number: int, box: NDArray[np.float64], image: Image) -> None:
+        """Cut the object out, where it is larger than in the picture of it that is kept."""
+        left, top, right, bottom = box.tolist()
+        extent = (right - left) * (bottom - top)
+        if extent <= _BETTER * self._extent.get(number, 0.0):
             return
-        reach = _SURROUNDINGS * max(width, height)
+        reach = _SURROUNDINGS * max(right - left, bottom - top)
         x0, y0 = (max(0, round(start - reach)) for start in (left, top))
-        x1, y1 = round(left + width + reach) + 1, round(top + height + reach) + 1
-        cut = image[y0:y1, x0:x1]
+        cut = image[y0 : round(bottom + reach) + 1, x0 : round(right + reach) + 1]
         if cut.size == 0:
             return
         shrink = min(1.0, _THUMBNAIL / max(cut.shape[:2]))
         size = (max(1, round(shrink * cut.shape[1])), max(1, round(shrink * cut.shape[0])))
-        self._thumbnails[number] = np.asarray(cv2.resize(cut, size, interpolation=cv2.INTER_AREA), np.uint8)
-        self._extent[number] = width * height
+        self.thumbnails[number] = np.asarray(cv2.resize(cut, size, interpolation=cv2.INTER_AREA), np.uint8)
+        self._extent[number] = extent
+
+
+def _joined(tables: Iterable[ObjectTable]) -> ObjectTable:
+    """One table of several, ordered."""
+    parts = [ObjectTable.empty(), *tables]
+    columns = {
+        item.name: np.concatenate([getattr(part, item.name) for part in parts])
+        for item in fields(ObjectTable)
+    }
+    order = np.lexsort((columns["object"], columns["frame"]))
+    return ObjectTable(**{name: column[order] for name, column in columns.items()})
