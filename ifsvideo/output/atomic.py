@@ -8,7 +8,9 @@ before stands there again.
 from __future__ import annotations
 
 import os
+import re
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
@@ -41,6 +43,38 @@ def check_writable(target: Path) -> None:
         raise OutputError(f"{target}: no permission to write in {real_folder}; name another folder")
     if target.exists() and not os.access(target, os.W_OK):
         raise OutputError(f"{target}: exists and is write-protected; name another output or allow writing")
+
+
+def check_folder(target: Path, own: str) -> None:
+    """Refuse a place where no folder can be written, before any work is done.
+
+    A folder that stands there is replaced, so it must hold nothing but what an earlier run wrote.
+
+    Parameters
+    ----------
+    target : Path
+    own : str
+        Pattern that the whole name of every such file matches.
+
+    Raises
+    ------
+    OutputError
+        If it holds something else, or no folder can be made there.
+    """
+    if target.exists() and not target.is_dir():
+        raise OutputError(f"{target}: is a file; name a folder")
+    folder = _real(target).parent
+    if not folder.is_dir():
+        raise OutputError(f"{target}: the folder {target.parent} does not exist; create it first")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(f"{target}: no permission to write in {folder}; name another folder")
+    try:
+        names = sorted(os.listdir(target)) if target.exists() else []
+    except OSError as error:
+        raise output_error(target, error) from None
+    foreign = next((name for name in names if not re.fullmatch(own, name)), None)
+    if foreign is not None:
+        raise OutputError(f"{target}: holds {foreign}, which would be lost; name a new folder, or empty it")
 
 
 def output_error(target: Path, error: OSError) -> OutputError:
@@ -90,6 +124,25 @@ class Outputs:
             raise output_error(target, error) from None
         return temporary
 
+    def add_folder(self, target: Path) -> Path:
+        """Name of an empty hidden folder, to be filled in the target's stead.
+
+        What stands there is replaced whole; `check_folder` tells whether nothing is lost by it.
+
+        Raises
+        ------
+        OutputError
+            If the folder cannot be created.
+        """
+        real = _real(target)
+        temporary = _hidden(real)
+        self._staged.append((temporary, real))
+        try:
+            temporary.mkdir()
+        except OSError as error:
+            raise output_error(target, error) from None
+        return temporary
+
     def add_scratch(self, beside: Path) -> Path:
         """Name of a hidden file on the same disk, not yet there, that is removed in the end."""
         self._scratch.append(_hidden(beside))
@@ -118,7 +171,7 @@ class Outputs:
         try:
             for temporary, real in self._staged:
                 placing.append((temporary, real, _hidden(real)))
-                if len(self._staged) > 1 and real.exists():
+                if real.exists() and (len(self._staged) > 1 or real.is_dir()):
                     _keep_old(real, placing[-1][2])
                 os.replace(temporary, real)
         except BaseException as error:
@@ -128,14 +181,14 @@ class Outputs:
                 raise output_error(placing[-1][1], error) from None
             raise
         for _, _, backup in placing:
-            backup.unlink(missing_ok=True)
+            _remove(backup)
         self._staged.clear()
 
     def discard(self) -> None:
         """Remove what was written and not placed; the targets are untouched."""
         for temporary in [*(file for file, _ in self._staged), *self._scratch]:
             with suppress(OSError):
-                temporary.unlink(missing_ok=True)
+                _remove(temporary)
         self._staged.clear()
         self._scratch.clear()
 
@@ -222,17 +275,27 @@ def _hidden(real: Path) -> Path:
     return real.with_name(f".ifsvideo-{secrets.token_hex(6)}{real.suffix}")
 
 
+def _remove(path: Path) -> None:
+    """Remove a file or a folder, if it is there."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
 def _keep_old(real: Path, backup: Path) -> None:
-    """Give the file that stands at ``real`` a second name."""
+    """Give the file that stands at ``real`` a second name; a folder, another."""
     try:
         os.link(real, backup)
-    except OSError:  # a file system without hard links
+    except OSError:  # a folder, or a file system without hard links
         os.rename(real, backup)
 
 
 def _undo(real: Path, backup: Path, *, placed: bool) -> None:
     """Put back what stood at ``real``: the file kept as ``backup``, or nothing."""
     with suppress(OSError):
+        if real.is_dir() and placed:
+            shutil.rmtree(real)
         if backup.exists():
             os.replace(backup, real)
             backup.unlink(missing_ok=True)  # replace() does nothing where both names are one file
