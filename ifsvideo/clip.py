@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.errors import UsageError
 from ifsvideo.output.atomic import check_writable
-from ifsvideo.tracking.files import load_tracks
+from ifsvideo.tracking.files import load_trajectories
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import Tracks, VideoInfo
 from ifsvideo.video import FrameSource, check_output, open_source
@@ -85,9 +85,12 @@ def open_clip(source: Source, fps: Fraction | None, start: float, end: float | N
         if fps is not None:
             raise UsageError(f"{name}: is open already and has its rate; leave out fps")
         return Clip(str(source.path), source.info, source.path, frames=source)
-    tracks = load_tracks(source) if isinstance(source, str | Path) else as_tracks(source)
-    info = _info_of(tracks, fps)
-    return Clip(name, info, path, trajectories=Trajectories.from_tracks(replace(tracks, fps=float(info.fps))))
+    if isinstance(source, str | Path):
+        points = load_trajectories(source)
+    else:
+        points = Trajectories.from_tracks(as_tracks(source))
+    info = _info_of(points, fps)
+    return Clip(name, info, path, trajectories=replace(points, fps=float(info.fps)))
 
 
 def check_outputs(clip: Clip, video: Path | None, labels: Path | None) -> None:
@@ -117,14 +120,14 @@ def _same(one: Path, other: Path) -> bool:
     return os.path.realpath(one) == os.path.realpath(other)
 
 
-def _info_of(tracks: Tracks, fps: Fraction | None) -> VideoInfo:
+def _info_of(points: Trajectories, fps: Fraction | None) -> VideoInfo:
     """Size and rate of tracks; where nobody told the size, the extent of the points."""
-    rate = fps or (Fraction(tracks.fps).limit_denominator(100_000) if tracks.fps else DEFAULT_FPS)
-    width, height = tracks.size or _extent(tracks.xy[tracks.visible])
-    return VideoInfo(width, height, rate, tracks.frames)
+    rate = fps or (Fraction(points.fps).limit_denominator(100_000) if points.fps else DEFAULT_FPS)
+    width, height = points.size or _extent(points.xy)
+    return VideoInfo(width, height, rate, points.frames)
 
 
-def _extent(xy: NDArray[np.float64]) -> Sequence[int]:
+def _extent(xy: NDArray[np.float32]) -> Sequence[int]:
     if len(xy) == 0:
         return 1, 1
     return [max(1, int(side)) for side in np.ceil(xy.max(axis=0) + 1).tolist()]

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 
 from ifsvideo.errors import InputError
+from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import Tracks
 
+_FIELDS = ("xy", "visible", "ids", "size", "fps", "frame", "track", "frames")
 LAYOUTS = "xy (F, P, 2) in .npz; y (3, P, F), or the struct Data with ySparse (3, P, F), in .mat"
 
 
@@ -22,23 +24,41 @@ def load_tracks(path: str | Path) -> Tracks:
     Parameters
     ----------
     path : str or Path
-        ``.npz`` with ``xy`` (F, P, 2) pixels, NaN where not seen, and optionally ``visible`` (F, P) and
-        ``ids`` (P,), integers, each once. Or ``.mat``: Hopkins-155 (``y`` (3, P, F) homogeneous pixels,
-        ``width``, ``height``), or KT3DMoSeg (the struct ``Data`` with ``ySparse`` (3, P, F) and
-        ``visibleSparse`` (P, F); all visible where that is missing).
+        ``.npz`` with ``xy`` (F, P, 2) pixels, NaN where not seen, and optionally ``visible`` (F, P),
+        ``ids`` (P,), integers, each once, ``size`` (width, height) of the picture, ``fps``. Or, as
+        `ifsvideo.output.tracks_npz` writes long clips, a row for each track and frame in which it is seen:
+        ``frame``, ``track``, ``xy`` (N, 2), and ``frames``, how many there are. Or ``.mat``: Hopkins-155
+        (``y`` (3, P, F) homogeneous pixels, ``width``, ``height``), or KT3DMoSeg (the struct ``Data`` with
+        ``ySparse`` (3, P, F) and ``visibleSparse`` (P, F); all visible where that is missing).
 
     Raises
     ------
     InputError
         If the file is missing or damaged, or holds something else.
     """
-    file = Path(path)
+    found = _load(Path(path))
+    return found if isinstance(found, Tracks) else found.window(0, found.frames)
+
+
+def load_trajectories(path: str | Path) -> Trajectories:
+    """The same as `load_tracks` reads, but never as larger arrays than those of the file.
+
+    Raises
+    ------
+    InputError
+        As `load_tracks`.
+    """
+    found = _load(Path(path))
+    return found if isinstance(found, Trajectories) else Trajectories.from_tracks(found)
+
+
+def _load(file: Path) -> Tracks | Trajectories:
     if not file.is_file():
         raise InputError(f"{file}: no such file; give a .npz or .mat file of tracks")
     ending = file.suffix.lower()
     try:
         if ending == ".npz":
-            tracks = _from_npz(file)
+            tracks: Tracks | Trajectories = _from_npz(file)
         elif ending == ".mat":
             tracks = _from_mat(loadmat(file))
         else:
@@ -54,29 +74,71 @@ def load_tracks(path: str | Path) -> Tracks:
         raise InputError(
             f"{file}: is damaged or not of its ending's kind ({reason}); write it anew"
         ) from fault
-    if tracks.frames == 0 or tracks.points == 0:
-        raise InputError(
-            f"{file}: holds {tracks.points} tracks over {tracks.frames} frames; give at least one"
-        )
+    points = tracks.points if isinstance(tracks, Tracks) else len(np.unique(tracks.ids))
+    if tracks.frames == 0 or points == 0:
+        raise InputError(f"{file}: holds {points} tracks over {tracks.frames} frames; give at least one")
     return tracks
 
 
-def _from_npz(file: Path) -> Tracks:
+def _from_npz(file: Path) -> Tracks | Trajectories:
+    content = _arrays(file)
+    if "xy" not in content:
+        raise InputError(f"has no field xy, only {', '.join(content) or 'nothing'}; give {LAYOUTS}")
+    xy = _numbers(content["xy"], "xy")
+    size, fps = _told(content)
+    if xy.ndim == 2 and "track" in content:
+        return _from_rows(content, xy, size, fps)
+    if xy.ndim != 3 or xy.shape[2] != 2:
+        raise InputError(f"xy has shape {xy.shape}; give (frames, tracks, 2)")
+    visible = content.get("visible")
+    if visible is not None and visible.shape != xy.shape[:2]:
+        raise InputError(f"visible has shape {visible.shape}; give {xy.shape[:2]} as xy has")
+    return Tracks.from_array(xy, visible, _checked_ids(content.get("ids"), xy.shape[1]), size, fps)
+
+
+def _arrays(file: Path) -> dict[str, NDArray[Any]]:
+    """What is looked at of the arrays of an archive; of others only the name."""
     # A stream of our own: numpy leaves the file open where it finds the archive damaged.
     with file.open("rb") as stream:
         content = np.load(stream, allow_pickle=False)
         if isinstance(content, np.ndarray):
             raise InputError("holds a single array; write it by numpy.savez(file, xy=array)")
-        fields = {name: content[name] for name in ("xy", "visible", "ids") if name in content}
-        if "xy" not in fields:
-            raise InputError(f"has no field xy, only {', '.join(content) or 'nothing'}; give {LAYOUTS}")
-    xy = _numbers(fields["xy"], "xy")
-    if xy.ndim != 3 or xy.shape[2] != 2:
-        raise InputError(f"xy has shape {xy.shape}; give (frames, tracks, 2)")
-    visible = fields.get("visible")
-    if visible is not None and visible.shape != xy.shape[:2]:
-        raise InputError(f"visible has shape {visible.shape}; give {xy.shape[:2]} as xy has")
-    return Tracks.from_array(xy, visible, _checked_ids(fields.get("ids"), xy.shape[1]))
+        return {name: content[name] if name in _FIELDS else np.empty(0) for name in content}
+
+
+def _told(content: Mapping[str, NDArray[Any]]) -> tuple[tuple[int, int] | None, float | None]:
+    """Size of the picture and frames per second, where the archive tells them."""
+    size, fps = content.get("size"), content.get("fps")
+    if size is not None and (size.shape != (2,) or not (size >= 1).all()):
+        raise InputError(f"size is {size.tolist()}; give width and height of the picture, pixels")
+    if fps is not None and (fps.shape != () or not 0 < fps < np.inf):
+        raise InputError(f"fps is {fps.tolist()}; give one positive number")
+    sides = None if size is None else (int(size[0]), int(size[1]))
+    return sides, None if fps is None else float(fps)
+
+
+def _from_rows(
+    content: Mapping[str, NDArray[Any]],
+    xy: NDArray[np.float64],
+    size: tuple[int, int] | None,
+    fps: float | None,
+) -> Trajectories:
+    """A row for every track and frame in which it is seen."""
+    missing = [name for name in ("frame", "frames") if name not in content]
+    if missing:
+        raise InputError(f"has rows but no {' and no '.join(missing)}; give frame, track, xy, frames")
+    frame, track = content["frame"], content["track"]
+    for name, column in (("frame", frame), ("track", track)):
+        if column.shape != xy.shape[:1] or not np.issubdtype(column.dtype, np.integer):
+            raise InputError(f"{name} is {column.dtype} of shape {column.shape}; give {len(xy)} integers")
+    frames = int(content["frames"])
+    if xy.shape[1:] != (2,) or not np.isfinite(xy).all():
+        raise InputError(f"xy of rows has shape {xy.shape} or is not finite; give (rows, 2)")
+    if len(frame) and not (frame[0] >= 0 and frame[-1] < frames and (np.diff(frame) >= 0).all()):
+        raise InputError(f"frame does not rise from 0 to {frames - 1}; order the rows by it")
+    return Trajectories(
+        frame.astype(np.int32), track.astype(np.int64), xy.astype(np.float32), frames, size, fps
+    )
 
 
 def _checked_ids(ids: NDArray[Any] | None, points: int) -> NDArray[Any] | None:
