@@ -17,7 +17,13 @@ as wrong, true label 0 not counted; averaged over runs, then over sequences. Exa
 Seconds: spent segmenting, on one thread, summed over the sequences, of one run. Std: of the mean error,
 over runs. Moves: a point is truly moving if its group is not 1, called moving if its label is > 0;
 precision and recall in per cent over the points of all sequences and runs together. All one motion: the
-error of calling everything background. Beside hopkins155 stand the figures that were published for it.
+error of calling everything background. Beside hopkins155 stand the figures that were published for it, beside
+kt3dmoseg the error with the number of motions told ("number known, same tree": the same merges, cut there).
+
+Scoring of kt3dmoseg --video. The whole program runs on the frames. A labelled point, in each frame in which
+it is seen, takes the label of the program's nearest point in that frame, if one is within 10 pixels, and is
+then scored as above, -1 counting as wrong; error averaged over runs, then over sequences; precision, recall
+and coverage over all points together. Coverage: per cent of the labelled points with such a neighbour.
 
 Scoring of samples. The whole pipeline runs on each clip, and every row of the labels is compared with the
 mask at its rounded position (all rows count, also those at a mask's border); a row truly moves if the mask
@@ -46,7 +52,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ifsvideo.benchmark import comparison, datasets, learning, learning_data, samples, static, table
+from ifsvideo.benchmark import comparison, datasets, driving, learning, learning_data, samples, static, table
 from ifsvideo.benchmark.comparison import Method, Trial
 from ifsvideo.benchmark.datasets import LabelledSequence
 from ifsvideo.benchmark.learning_data import Example
@@ -56,12 +62,14 @@ from ifsvideo.benchmark.options import (
     add_only,
     add_runs,
     configuration,
+    made_folder,
     whole,
     write_report,
     write_text,
 )
 from ifsvideo.benchmark.perturb import Perturbation
 from ifsvideo.benchmark.runner import IFSFactory, Report
+from ifsvideo.benchmark.side_by_side import draw_all
 from ifsvideo.config import Config
 from ifsvideo.errors import IfsVideoError, UsageError
 from ifsvideo.output.atomic import check_writable
@@ -137,6 +145,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--show", metavar="NAME", help="with --plot: draw the stages of this sequence, too")
     add("--verbose", action="store_true", help="a line for each sequence of hopkins155, too")
+    frames = parser.add_argument_group("of kt3dmoseg only")
+    add = frames.add_argument
+    add("--video", action="store_true", help="also run the whole program on the frames")
+    add(
+        "--overlay",
+        metavar="DIR",
+        type=Path,
+        help="write each clip there, with the truth and what the first run found, of the tracks or, with "
+        "--video, of the frames",
+    )
     return parser
 
 
@@ -187,13 +205,20 @@ def _check(options: argparse.Namespace) -> None:
         if given:
             name = min(given).replace("_", "-")
             raise UsageError(f"--{name}: is for tracks with a truth; leave the option out for samples")
+    if options.dataset != "kt3dmoseg" and (options.video or options.overlay):
+        name = "video" if options.video else "overlay"
+        raise UsageError(
+            f"--{name}: is for frames with labelled tracks; leave the option out, or measure kt3dmoseg"
+        )
     if options.show is not None and not options.plot:
         raise UsageError("--show draws pictures; say where by --plot DIR")
     if options.json:
         check_writable(options.json)
     if options.plot:
         _need_matplotlib()
-        check_writable(options.plot / "errors.png" if options.plot.is_dir() else options.plot)
+    for folder in (options.plot, options.overlay):
+        if folder:
+            check_writable(folder / "one.file" if folder.is_dir() else folder)
 
 
 def _need_matplotlib() -> None:
@@ -229,11 +254,15 @@ def _measure_points(options: argparse.Namespace) -> None:
         raise UsageError(
             f"--show: no sequence is called {options.show}; --verbose without --show lists their names"
         )
+    if options.video or options.overlay:
+        driving.check_frames(sequences, options.folder)
     own = Method("ifsvideo", IFSFactory(configuration(options.config).segmentation), options.motions_known)
     methods = [own, *(_peers() if options.peers else ())]
     trial = Trial(options.runs, options.seed, options.jobs, Perturbation(options.noise, options.drop))
     scores = comparison.compare(options.dataset, sequences, methods, trial)
     report = {"dataset": options.dataset, "configuration": options.config, **scores}
+    if options.dataset == "kt3dmoseg":
+        _add_driving(report, sequences, own, trial, options)
     if options.plot:
         report["noise_curve"] = comparison.noise_curve(sequences, methods, trial, report)
     print(table.points(report, by_sequence=options.verbose or options.dataset != "hopkins155"))
@@ -241,6 +270,26 @@ def _measure_points(options: argparse.Namespace) -> None:
         write_report(options.json, report)
     if options.plot:
         _draw(options.plot, report, shown, own, trial)
+
+
+def _add_driving(
+    report: Report,
+    sequences: Sequence[LabelledSequence],
+    own: Method,
+    trial: Trial,
+    options: argparse.Namespace,
+) -> None:
+    """What only kt3dmoseg is asked: the floor of a known number, the frames, clips to look at."""
+    if not own.motions_known:
+        comparison.add_number_known(report, sequences, own, trial)
+    overlay = made_folder(options.overlay) if options.overlay else None
+    if options.video:
+        factory = samples.PipelineFactory(configuration(options.config))
+        report["video"] = driving.run_frames(
+            sequences, options.folder, factory, trial.runs, trial.seed, trial.jobs, overlay=overlay
+        )
+    elif overlay:
+        draw_all(sequences, options.folder, own, trial, overlay)
 
 
 def _learn(options: argparse.Namespace) -> None:

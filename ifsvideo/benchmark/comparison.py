@@ -75,6 +75,19 @@ def compare(
     return {**own, "peers": peers, "published": [asdict(one) for one in known]}
 
 
+def add_number_known(
+    report: Report, sequences: Sequence[LabelledSequence], method: Method, trial: Trial
+) -> None:
+    """Add the errors of a method that is told the number of motions to what it reached without.
+
+    The same merges in the same order, cut at the true number: what is left to win by knowing when to stop.
+    """
+    told = trial.run(sequences, replace(method, motions_known=True))
+    report["number_known"] = told["error"]["all"]
+    for row, known in zip(report["sequences"], told["sequences"], strict=True):
+        row["number_known"] = known["error"]
+
+
 def noise_curve(
     sequences: Sequence[LabelledSequence], methods: Sequence[Method], trial: Trial, measured: Report
 ) -> list[Report]:

@@ -90,6 +90,11 @@ def load(dataset: str, folder: Path, only: str = "*") -> list[LabelledSequence]:
     return [_load_one(name, files[name], layout) for name in chosen]
 
 
+def frames_of(folder: Path, name: str) -> Path:
+    """Where the frames of a sequence of ``kt3dmoseg`` lie, if they are there."""
+    return folder / "OriginalSequences" / name
+
+
 @dataclass(frozen=True)
 class _Layout:
     """How a data set lies in its folder: patterns of its files, their reader, and what helps a bad file."""
@@ -144,7 +149,7 @@ def _read_kt3dmoseg(name: str, file: Path) -> LabelledSequence:
     visible = None
     if "visibleSparse" in fields:
         visible = fields["visibleSparse"].reshape(xy.shape[1], -1).T != 0
-    tracks = Tracks.from_array(xy, visible, size=_frame_size(file.parent / "OriginalSequences" / name))
+    tracks = Tracks.from_array(xy, visible, size=_frame_size(frames_of(file.parent, name)))
     return LabelledSequence(name, "driving", tracks, fields["GtLabel"].ravel().astype(np.int64))
 
 

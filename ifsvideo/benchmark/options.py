@@ -11,7 +11,7 @@ from pathlib import Path
 from ifsvideo.benchmark.runner import Report
 from ifsvideo.config import Config
 from ifsvideo.config_file import load_config
-from ifsvideo.errors import UsageError
+from ifsvideo.errors import OutputError, UsageError
 from ifsvideo.output.atomic import output_error, replacing
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.video import parse_time
@@ -68,6 +68,21 @@ def seconds(text: str) -> float:
         return parse_time(text)
     except UsageError as fault:
         raise argparse.ArgumentTypeError(str(fault)) from None
+
+
+def made_folder(path: Path) -> Path:
+    """A folder for files of several names, made where it is missing.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made.
+    """
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as fault:
+        raise OutputError(f"{path}: cannot be made ({fault.strerror}); name another folder") from fault
+    return path
 
 
 def write_report(path: Path, report: Report) -> None:

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ifsvideo.benchmark.options import made_folder
 from ifsvideo.benchmark.runner import Report
 from ifsvideo.benchmark.table import heading
-from ifsvideo.errors import OutputError
 from ifsvideo.output.atomic import output_error, replacing
 
 # Okabe and Ito, "Color Universal Design" (2008); each goes with a marker or a hatching of its own.
@@ -39,10 +39,7 @@ def write(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     OutputError
         If a file cannot be written.
     """
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as fault:
-        raise OutputError(f"{folder}: cannot be made ({fault.strerror}); name another folder") from fault
+    made_folder(folder)
     return [_save(figure, folder / name) for name, figure in figures.items()]
 
 

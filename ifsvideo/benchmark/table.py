@@ -37,6 +37,8 @@ def points(report: Report, by_sequence: bool) -> str:
         parts.append(_methods(report))
     if "noise_curve" in report:
         parts.append(_noise_curve(report["noise_curve"]))
+    if "video" in report:
+        parts.append(_video(report["video"]))
     parts.append(_footer(report))
     return "\n\n".join(parts)
 
@@ -129,25 +131,39 @@ def _noise_curve(curve: Sequence[Report]) -> str:
 
 def _sequences(report: Report) -> str:
     """A line for each sequence of the package's own method."""
-    header = ("sequence", "motions", "found", "error %", "one motion %", "precision %", "recall %", "seconds")
-    moves = report["dataset"] == "kt3dmoseg"
-    kept = [name for name in header if moves or name not in ("precision %", "recall %")]
+    header = ["sequence", "motions", "found", "error %", "one motion %"]
+    known, moves = "number_known" in report, report["dataset"] == "kt3dmoseg"
+    header += ["number known %"] if known else []
+    header += ["precision %", "recall %"] if moves else []
     rows = []
     for row in report["sequences"]:
         found = ",".join(str(count) for count in row["estimated"])
         cells = [row["name"], row["motions"], found, row["error"], row["one_motion"]]
+        cells += [row["number_known"]] if known else []
         cells += [row["moves"]["precision"], row["moves"]["recall"]] if moves else []
         rows.append([*cells, row["seconds"]])
-    return align(kept, rows)
+    return align([*header, "seconds"], rows)
+
+
+def _video(video: Report) -> str:
+    """A line for each clip whose frames the whole program ran on, then all of them."""
+    fields = ("name", "error", "precision", "recall", "coverage")
+    header = ("whole program on frames", "error %", "precision %", "recall %", "coverage %")
+    return align(
+        header, [[row[field] for field in fields] for row in (*video["sequences"], {"name": "all", **video})]
+    )
 
 
 def _footer(report: Report) -> str:
     """The figures over all sequences, a line each."""
+    floors = f"all one motion: {report['one_motion']:.2f}"
+    if "number_known" in report:
+        floors += f"; number known, same tree: {report['number_known']:.2f}"
     by_motions = [f"{key} motions {value:.2f}" for key, value in report["error"].items() if key != "all"]
     lines = [
         heading(report),
         f"error %: {report['error']['all']:.2f} ({', '.join(by_motions)}), median {report['median']:.2f}, "
-        f"std over runs {_text(_scatter(report, report))}; all one motion: {report['one_motion']:.2f}",
+        f"std over runs {_text(_scatter(report, report))}; {floors}",
         f"exact count %: {report['exact_count']:.1f}   seconds of one run: {report['seconds']:.1f}",
     ]
     if report["dataset"] == "kt3dmoseg":
