@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import NoReturn, TypeVar, get_args, get_type_hints
 
 from ifsvideo import __version__
 from ifsvideo.clip import is_tracks_file
-from ifsvideo.config import Config
+from ifsvideo.config import Config, OverlayConfig
 from ifsvideo.config_file import load_config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, parse_area
@@ -98,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_files(parser)
     _add_reading(parser)
     _add_finding(parser)
+    _add_showing(parser)
     _add_running(parser)
     return parser
 
@@ -112,7 +113,7 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="FILE",
-        help="overlay: .mp4, .mov or .mkv (default: INPUT.ifs.mp4 beside the input)",
+        help="overlay: .mp4, .mov, .mkv, .gif or .webp (default: INPUT.ifs.mp4 beside the input)",
     )
     files.add_argument(
         "--labels", type=Path, metavar="FILE", help="label of every point (default: .csv beside the overlay)"
@@ -169,9 +170,31 @@ def _add_finding(parser: argparse.ArgumentParser) -> None:
     finding.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings")
 
 
+def _add_showing(parser: argparse.ArgumentParser) -> None:
+    showing = parser.add_argument_group("showing")
+    showing.add_argument(
+        "--style",
+        choices=get_args(get_type_hints(OverlayConfig)["style"]),
+        help="what is drawn; spotlight: movers in colour, all else grey (default: full)",
+    )
+    showing.add_argument(
+        "--layout",
+        choices=get_args(get_type_hints(OverlayConfig)["layout"]),
+        help="the overlay alone, or with the plain picture (default: overlay)",
+    )
+    showing.add_argument("--title", metavar="TEXT", help="words on the first seconds")
+    showing.add_argument("--slow", type=_option(_number), metavar="N", help="play N times slower, silently")
+    showing.add_argument(
+        "--transparent", action="store_true", help="the drawing alone, to lay over a video: .mov, .webp, .gif"
+    )
+    showing.add_argument(
+        "--max-size", type=_option(_number), metavar="MB", help="keep a .gif or .webp smaller than this"
+    )
+    showing.add_argument("--no-legend", action="store_true", help="no time, frame and number on the picture")
+
+
 def _add_running(parser: argparse.ArgumentParser) -> None:
     running = parser.add_argument_group("running")
-    running.add_argument("--no-legend", action="store_true", help="no time, frame and number on the picture")
     running.add_argument("--quiet", action="store_true", help="print nothing but errors")
     running.add_argument("--debug", action="store_true", help="show where in the program an error arose")
     running.add_argument("--version", action="version", version=f"ifsvideo {__version__}")
@@ -206,6 +229,13 @@ def _whole(text: str) -> int:
     return int(text)
 
 
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"{text!r} is no number") from None
+
+
 def _k1(text: str) -> float:
     try:
         k1 = float(text)
@@ -230,9 +260,15 @@ def _config(told: argparse.Namespace) -> Config:
         config = replace(config, segmentation=replace(config.segmentation, distortion=told.distortion))
     if told.seed is not None:
         config = replace(config, seed=told.seed)
-    if told.no_legend:
-        config = replace(config, overlay=replace(config.overlay, legend=False))
-    return config
+    return replace(config, overlay=_overlay(told, config.overlay))
+
+
+def _overlay(told: argparse.Namespace, config: OverlayConfig) -> OverlayConfig:
+    wishes = {"style": told.style, "layout": told.layout, "title": told.title, "slow": told.slow}
+    wishes["max_size_mb"] = told.max_size
+    wishes["transparent"] = told.transparent or None
+    wishes["legend"] = False if told.no_legend else None
+    return replace(config, **{name: wish for name, wish in wishes.items() if wish is not None})
 
 
 def _jobs(sources: Sequence[Path], output: Path | None, labels: Path | None) -> tuple[Job, ...]:

@@ -6,6 +6,7 @@ Lengths given as shares are shares of the picture's diagonal, so that one config
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from ifsvideo.errors import UsageError
 from ifsvideo.segmentation.config import SegmenterConfig
@@ -74,25 +75,51 @@ class TrackerConfig:
 
 @dataclass(frozen=True)
 class OverlayConfig:
-    """The drawn video (section ``[overlay]``)."""
+    """The drawn video (section ``[overlay]``); what is None is as in `ifsvideo.output.styles`."""
 
+    style: Literal["full", "dots", "trails", "hulls", "spotlight"] = "full"
+    """``full`` shows all that is known; the others are for showing to people: points, paths, areas, or what
+    moves in colour on a picture that is grey."""
+    layout: Literal["overlay", "side-by-side", "stacked", "before-after"] = "overlay"
+    """The drawn picture alone; beside or below the plain one; or parted by a line that sweeps to and fro."""
+    transparent: bool = False
+    """Whether the drawing alone is written, to be laid over something else: .mov, .webp or .gif."""
+    title: str = ""
+    """Words at the lower left, none unless told."""
+    title_s: float = 4.0
+    """How long they stand there, seconds of the output: long enough to read a line twice; 0: to the end."""
+    slow: float = 1.0
+    """How many times slower the output plays; its sound is left out then, which would not fit."""
+    max_size_mb: float | None = None
+    """Largest .gif or .webp, 10^6 bytes, kept by showing less (`ifsvideo.video.animation`); None: any."""
     legend: bool = True
     """Whether the small legend is drawn."""
-    trail_s: float = 0.3
-    """Length of the trails, seconds: long enough to show where a point goes, short enough not to tangle."""
-    hull_opacity: float = 0.2
+    trail_s: float | None = None
+    """Length of the trails, seconds."""
+    hull_opacity: float | None = None
     """How strongly an object's colour covers it, 0 to 1; more and the object itself is hard to see."""
-    picture_brightness: float = 0.7
-    """Brightness of the picture behind the drawing, 0 to 1; pale colours still stand out on a white sky."""
-    picture_colour: float = 0.55
-    """Share of the picture's own colour that is kept, 0 to 1, so that a red car is not taken for a label."""
+    picture_brightness: float | None = None
+    """Brightness of the picture behind the drawing, 0 to 1."""
+    picture_colour: float | None = None
+    """Share of the picture's own colour that is kept, 0 to 1."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.trail_s <= 10.0:
-            raise UsageError(f"overlay.trail_s must be 0 to 10, got {self.trail_s}")
-        for name in ("hull_opacity", "picture_brightness", "picture_colour"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise UsageError(f"overlay.{name} must be 0 to 1, got {getattr(self, name)}")
+        for name, least, most in (
+            ("trail_s", 0.0, 10.0),
+            ("hull_opacity", 0.0, 1.0),
+            ("picture_brightness", 0.0, 1.0),
+            ("picture_colour", 0.0, 1.0),
+            ("title_s", 0.0, 3600.0),
+            ("slow", 1.0, 100.0),
+            ("max_size_mb", 0.01, 10000.0),
+        ):
+            value = getattr(self, name)
+            if value is not None and not least <= value <= most:
+                raise UsageError(f"overlay.{name} must be {least:g} to {most:g}, got {value}")
+        if self.transparent and self.layout != "overlay":
+            raise UsageError(
+                f"transparent leaves the picture out, {self.layout} shows it; ask for one of them"
+            )
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,9 @@ from ifsvideo.objects.numbering import settle
 from ifsvideo.output.atomic import Outputs
 from ifsvideo.output.labels import LabelSink
 from ifsvideo.output.overlay import OverlayRenderer
-from ifsvideo.output.overlay_video import OverlaySink
+from ifsvideo.output.overlay_video import OverlaySink, check_wishes
 from ifsvideo.output.scenes import Scenes
+from ifsvideo.output.styles import look_of
 from ifsvideo.segmentation.segmenter import IFSSegmenter
 from ifsvideo.tracking.tracker import KltTracker
 from ifsvideo.tracking.trajectories import Trajectories
@@ -103,7 +104,7 @@ class Pipeline:
             A video, a folder of images, a file of tracks (.npz, .mat), or tracks: (F, P, 2) float, pixels,
             NaN where a point is not seen. Of tracks only labels can be written.
         output, labels : path, optional
-            Overlay video (.mp4, .mov, .mkv) and CSV; they appear together when all is done.
+            Overlay (.mp4, .mov, .mkv, .gif, .webp) and CSV; they appear together when all is done.
         fps : Fraction or float, optional
             Frames per second of a folder or of tracks (10 unless told), or in place of a video's own.
         start, end : float, optional
@@ -131,6 +132,8 @@ class Pipeline:
             raise UsageError(f"motions must be at least 1, got {motions}")
         clip = open_clip(source, _exact(fps), start, end)
         check_outputs(clip, video, csv)
+        if video is not None:
+            check_wishes(video, self.config.overlay)
         if ignore and clip.frames is None:
             raise UsageError(f"{clip.name}: tracks hold no pictures; leave out ignore")
         mask = ignore_mask(ignore, clip.info)
@@ -147,7 +150,7 @@ class Pipeline:
                 sinks.append(LabelSink(csv, outputs))
             if video is not None:
                 sound = clip.path if audio and clip.info.has_audio else None
-                overlay = OverlaySink(video, clip.info, self.renderer, outputs, sound)
+                overlay = OverlaySink(video, clip.info, self.renderer, outputs, sound, self.config.overlay)
                 sinks.append(overlay)
             self._feed(sinks, clip, table, log)
             if video is not None:
@@ -193,7 +196,7 @@ class Pipeline:
         """Give every frame to every sink."""
         if not sinks:
             return
-        scenes = Scenes(clip.info, self.config.overlay.trail_s)
+        scenes = Scenes(clip.info, look_of(self.config.overlay).trail_s)
         wanted = clip.frames is not None and any(sink.wants_image for sink in sinks)
         pictures = clip.frames.frames() if clip.frames and wanted else _none(table.frames)
         with log.stage("writing"), closing(pictures):

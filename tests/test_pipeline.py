@@ -252,7 +252,7 @@ def test_errors_are_raised_before_any_work(pipeline, clip, tmp_path):
     for error, options in (
         (UsageError, {"output": clip}),
         (UsageError, {"labels": clip}),
-        (UsageError, {"output": tmp_path / "o.gif"}),
+        (UsageError, {"output": tmp_path / "o.avi"}),
         (UsageError, {"output": tmp_path / "o.mp4", "labels": tmp_path / "o.mp4"}),
         (UsageError, {"start": 100.0}),
         (OutputError, {"labels": tmp_path / "none" / "o.csv"}),

@@ -1,4 +1,4 @@
-"""Text on the picture: the number beside an object, and the legend."""
+"""Text on the picture: the number beside an object, the legend, and what they are written with."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from ifsvideo.output.palette import Colour, ink_on
 from ifsvideo.types import Image
 
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
-_BOLD = cv2.FONT_HERSHEY_DUPLEX
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+BOLD = cv2.FONT_HERSHEY_DUPLEX
 # Height of a capital letter at scale 1, pixels.
 _CAPITAL = 21.0
-_PANEL: Colour = (18, 20, 24)
-_PANEL_OPACITY = 0.62
-_INK: Colour = (240, 242, 244)
+PANEL: Colour = (18, 20, 24)
+PANEL_OPACITY = 0.62
+INK: Colour = (240, 242, 244)
 
 Box = tuple[int, int, int, int]
 """Left, top, right, bottom in pixels; right and bottom are outside."""
@@ -56,11 +56,11 @@ def draw_legend(canvas: Image, time_s: float, frame: int, objects: int, capital:
     pad = max(2, round(0.75 * capital))
     edge = pad
     for text in versions:
-        text_width = _text_width(text, capital, _FONT)
-        box = (edge, edge, edge + text_width + 2 * pad, edge + capital + 2 * pad)
+        wide = text_width(text, capital, FONT)
+        box = (edge, edge, edge + wide + 2 * pad, edge + capital + 2 * pad)
         if box[2] <= width - edge and box[3] <= height // 2:
-            _panel(canvas, box, _PANEL, _PANEL_OPACITY)
-            _write(canvas, text, (edge + pad, edge + pad + capital), capital, _INK, _FONT)
+            draw_panel(canvas, box, PANEL, PANEL_OPACITY)
+            write(canvas, text, (edge + pad, edge + pad + capital), capital, INK, FONT)
             return [box]
     return []
 
@@ -80,8 +80,8 @@ def draw_number(
     height, width = canvas.shape[:2]
     pad = max(2, round(0.4 * capital))
     text = str(number)
-    text_width = _text_width(text, capital, _BOLD)
-    size = (max(text_width, capital) + 2 * pad, capital + 2 * pad)
+    wide = text_width(text, capital, BOLD)
+    size = (max(wide, capital) + 2 * pad, capital + 2 * pad)
     left = int(np.clip(round(anchor[0] - size[0] / 2), 0, max(0, width - size[0])))
     wanted = round(anchor[1]) - size[1]
     box = (left, 0, left + size[0], size[1])
@@ -90,9 +90,9 @@ def draw_number(
         box = (left, top, left + size[0], top + size[1])
         if not any(_overlap(box, other) for other in taken):
             break
-    _panel(canvas, box, colour, 0.92)
-    start = (box[0] + (size[0] - text_width) // 2, box[1] + pad + capital)
-    _write(canvas, text, start, capital, ink_on(colour), _BOLD)
+    draw_panel(canvas, box, colour, 0.92)
+    start = (box[0] + (size[0] - wide) // 2, box[1] + pad + capital)
+    write(canvas, text, start, capital, ink_on(colour), BOLD)
     return box
 
 
@@ -100,11 +100,13 @@ def _overlap(a: Box, b: Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _text_width(text: str, capital: int, font: int) -> int:
+def text_width(text: str, capital: int, font: int) -> int:
+    """Width of a line whose capitals are ``capital`` pixels high, pixels."""
     return int(cv2.getTextSize(text, font, capital / _CAPITAL, _thickness(capital))[0][0])
 
 
-def _write(canvas: Image, text: str, start: tuple[int, int], capital: int, ink: Colour, font: int) -> None:
+def write(canvas: Image, text: str, start: tuple[int, int], capital: int, ink: Colour, font: int) -> None:
+    """Write a line; ``start`` is the left end of its baseline."""
     cv2.putText(canvas, text, start, font, capital / _CAPITAL, ink, _thickness(capital), cv2.LINE_AA)
 
 
@@ -112,8 +114,8 @@ def _thickness(capital: int) -> int:
     return max(1, round(capital / 14))
 
 
-def _panel(canvas: Image, box: Box, colour: Colour, opacity: float) -> None:
-    """Blend a plate with round corners into the canvas."""
+def draw_panel(canvas: Image, box: Box, colour: Colour, opacity: float, corner: float = 0.3) -> None:
+    """Blend a plate into the canvas; its corners are round, ``corner`` is their radius in heights."""
     height, width = canvas.shape[:2]
     left, top, right, bottom = max(box[0], 0), max(box[1], 0), min(box[2], width), min(box[3], height)
     if right <= left or bottom <= top:
@@ -121,7 +123,7 @@ def _panel(canvas: Image, box: Box, colour: Colour, opacity: float) -> None:
     # Drawn four times as large and averaged: OpenCV has no round rectangle with smooth corners.
     fine = 4
     mask = np.zeros(((bottom - top) * fine, (right - left) * fine), dtype=np.uint8)
-    radius = max(1, round(0.3 * fine * min(right - left, bottom - top)))
+    radius = max(1, round(corner * fine * min(right - left, bottom - top)))
     low, high = (0, 0), (mask.shape[1] - 1, mask.shape[0] - 1)
     cv2.rectangle(mask, (low[0] + radius, low[1]), (high[0] - radius, high[1]), (255,), -1)
     cv2.rectangle(mask, (low[0], low[1] + radius), (high[0], high[1] - radius), (255,), -1)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.config import OverlayConfig
 from ifsvideo.output import hull
+from ifsvideo.output.alpha import alone
 from ifsvideo.output.legend import Box, draw_legend, draw_number
 from ifsvideo.output.palette import (
     BACKGROUND_COLOUR,
@@ -18,6 +19,7 @@ from ifsvideo.output.palette import (
     Colour,
     object_colour,
 )
+from ifsvideo.output.styles import Look, look_of
 from ifsvideo.output.trails import TrailStyle, draw_trails
 from ifsvideo.types import BACKGROUND, Image, Scene
 
@@ -80,33 +82,46 @@ class OverlayRenderer:
 
     def __init__(self, config: OverlayConfig | None = None) -> None:
         self.config = config or OverlayConfig()
+        self._look = look_of(self.config)
 
     def draw(self, image: Image, scene: Scene) -> Image:
-        """Return the picture with the overlay; ``image`` (H, W, 3) uint8 RGB is not changed."""
-        canvas = self._subdued(image)
-        sizes = _Sizes.of(image)
+        """Return the picture with the overlay; ``image`` (H, W, 3) uint8 RGB is not changed.
+
+        Where the configuration asks for transparency, the drawing alone is returned, (H, W, 4) uint8 RGBA.
+        """
+        if not self.config.transparent:
+            return self._paint(self._subdued(image), image, scene)
+        lit = self.config.style == "spotlight"
+        return alone(lambda ground: self._paint(ground.copy(), image if lit else ground, scene), image.shape)
+
+    def _paint(self, canvas: Image, image: Image, scene: Scene) -> Image:
+        """Draw on ``canvas``; ``image`` is what shows inside an object's outline."""
+        look, sizes = self._look, _Sizes.of(image)
         shown = _drawable(scene.xy, image)
         objects = _objects(scene, shown, sizes)
-        for item in objects:
-            hull.fill(canvas, image, item.polygons, object_colour(item.label), self.config.hull_opacity)
+        for item in objects if look.area else []:
+            hull.fill(canvas, image, item.polygons, object_colour(item.label), look.hull_opacity)
         still = np.flatnonzero(shown & (scene.labels == BACKGROUND))
-        styles = [TrailStyle(still, BACKGROUND_TRAIL, sizes.small_trail)]
-        styles += [TrailStyle(item.points, object_colour(item.label), sizes.trail) for item in objects]
-        draw_trails(canvas, scene.trails, styles)
-        undecided = shown & (scene.labels < BACKGROUND)
-        _dots(canvas, scene.xy[undecided], sizes.small_dot, UNDECIDED_COLOUR, _DISCREET)
-        _dots(canvas, scene.xy[still], sizes.small_dot, BACKGROUND_COLOUR, _DISCREET)
+        if look.trails:
+            styles = [TrailStyle(still, BACKGROUND_TRAIL, sizes.small_trail)] if look.ground else []
+            styles += [TrailStyle(item.points, object_colour(item.label), sizes.trail) for item in objects]
+            draw_trails(canvas, scene.trails, styles, look.bands)
+        if look.ground:
+            undecided = shown & (scene.labels < BACKGROUND)
+            _dots(canvas, scene.xy[undecided], sizes.small_dot, UNDECIDED_COLOUR, _DISCREET)
+            _dots(canvas, scene.xy[still], sizes.small_dot, BACKGROUND_COLOUR, _DISCREET)
         for item in objects:
-            _draw_object(canvas, scene, item, sizes)
+            _draw_object(canvas, scene, item, sizes, look)
         self._write(canvas, scene, objects, sizes)
         return canvas
 
     def _write(self, canvas: Image, scene: Scene, objects: list[_Object], sizes: _Sizes) -> None:
         """Legend and numbers, above all that is drawn."""
         taken: list[Box] = []
-        if self.config.legend:
+        # The line that sweeps over the picture would cut through it.
+        if self.config.legend and self.config.layout != "before-after":
             taken += draw_legend(canvas, scene.time_s, scene.frame, len(objects), sizes.capital)
-        for item in objects:
+        for item in objects if self._look.numbers else []:
             largest = item.polygons[0]
             middle = float(largest[:, 0].min() + largest[:, 0].max()) / 2
             anchor = (middle, float(largest[:, 1].min()) - sizes.outline)
@@ -116,8 +131,8 @@ class OverlayRenderer:
     def _subdued(self, image: Image) -> Image:
         """The picture darker and paler, so that the colours stand out."""
         grey = np.tile(_LUMA, (3, 1))
-        colour = self.config.picture_colour
-        mix = self.config.picture_brightness * (colour * np.eye(3) + (1.0 - colour) * grey)
+        colour = self._look.picture_colour
+        mix = self._look.picture_brightness * (colour * np.eye(3) + (1.0 - colour) * grey)
         return np.asarray(cv2.transform(image, mix.astype(np.float32)), dtype=np.uint8)
 
 
@@ -137,13 +152,15 @@ def _objects(scene: Scene, shown: NDArray[np.bool_], sizes: _Sizes) -> list[_Obj
     return sorted(found, key=lambda item: -item.extent)
 
 
-def _draw_object(canvas: Image, scene: Scene, item: _Object, sizes: _Sizes) -> None:
+def _draw_object(canvas: Image, scene: Scene, item: _Object, sizes: _Sizes, look: Look) -> None:
     """Outline and dots of one object."""
     colour = object_colour(item.label)
-    edges = [hull.fixed_point(polygon) for polygon in item.polygons]
-    cv2.polylines(canvas, edges, True, colour, sizes.outline, cv2.LINE_AA, hull.SUBPIXEL_BITS)
-    _dots(canvas, scene.xy[item.points], sizes.dot + sizes.rim, _RIM)
-    _dots(canvas, scene.xy[item.points], sizes.dot, colour)
+    if look.outline:
+        edges = [hull.fixed_point(polygon) for polygon in item.polygons]
+        cv2.polylines(canvas, edges, True, colour, sizes.outline, cv2.LINE_AA, hull.SUBPIXEL_BITS)
+    if look.dots:
+        _dots(canvas, scene.xy[item.points], sizes.dot + sizes.rim, _RIM)
+        _dots(canvas, scene.xy[item.points], sizes.dot, colour)
 
 
 def _dots(

@@ -13,8 +13,8 @@ from ifsvideo.output.hull import SUBPIXEL_BITS, fixed_point
 from ifsvideo.output.palette import Colour
 from ifsvideo.types import Floats, Image
 
-# Opacity from the oldest third of a trail to the newest.
-_FADE = (0.25, 0.5, 0.85)
+# Opacity of a trail's oldest part and of its newest.
+_FADE = (0.25, 0.85)
 _PIECES_PER_BAND = 2
 
 
@@ -27,7 +27,7 @@ class TrailStyle:
     thickness: int
 
 
-def draw_trails(canvas: Image, trails: Floats, styles: Sequence[TrailStyle]) -> None:
+def draw_trails(canvas: Image, trails: Floats, styles: Sequence[TrailStyle], bands: int = 3) -> None:
     """Draw fading trails on ``canvas`` (H, W, 3) uint8.
 
     Parameters
@@ -36,15 +36,17 @@ def draw_trails(canvas: Image, trails: Floats, styles: Sequence[TrailStyle]) -> 
         Positions in pixels, oldest first, NaN where a point was not seen.
     styles : sequence of TrailStyle
         Drawn in this order.
+    bands : int
+        Parts of a trail that differ in opacity.
     """
     if len(trails) < 2 or not styles:
         return
     # A few pieces show the same curve as one per frame, and cost the same at any frame rate.
-    pieces = min(len(trails) - 1, len(_FADE) * _PIECES_PER_BAND)
+    pieces = min(len(trails) - 1, bands * _PIECES_PER_BAND)
     knots = np.round(np.linspace(0, len(trails) - 1, pieces + 1)).astype(int)
     position = trails[knots]
-    band_of = (np.arange(pieces) - pieces) * len(_FADE) // max(pieces, len(_FADE)) + len(_FADE)
-    for band, opacity in enumerate(_FADE):
+    band_of = (np.arange(pieces) - pieces) * bands // max(pieces, bands) + bands
+    for band, opacity in enumerate(np.geomspace(*_FADE, bands).tolist()):
         chosen = np.flatnonzero(band_of == band)
         layer = canvas.copy()
         drawn = [_draw_pieces(layer, position, chosen, style) for style in styles]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -14,7 +15,7 @@ import numpy as np
 from ifsvideo.errors import OutputError, UsageError
 from ifsvideo.output.atomic import Outputs, check_writable
 from ifsvideo.types import Image, VideoInfo
-from ifsvideo.video import ffmpeg
+from ifsvideo.video import animation, ffmpeg
 from ifsvideo.video.probe import audio_codec, count_frames
 
 FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
@@ -33,15 +34,19 @@ _COLOURS = (
 )
 
 
-def check_output(path: Path, source: Path | None = None) -> None:
+def check_output(
+    path: Path, source: Path | None = None, endings: Collection[str] = (*FORMATS, *animation.ENDINGS)
+) -> None:
     """Refuse an output before any work is done.
 
     Parameters
     ----------
     path : Path
-        Video to be written: .mp4, .mov or .mkv.
+        Video or animation to be written.
     source : Path, optional
         Input, which must be another file (also by another name of it).
+    endings : collection of str
+        Those that are known.
 
     Raises
     ------
@@ -50,8 +55,8 @@ def check_output(path: Path, source: Path | None = None) -> None:
     OutputError
         If nothing can be written there.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise UsageError(f"{path}: unknown ending {path.suffix!r}; name an output in {', '.join(FORMATS)}")
+    if path.suffix.lower() not in endings:
+        raise UsageError(f"{path}: unknown ending {path.suffix!r}; name an output in {', '.join(endings)}")
     if source is not None and path.exists() and source.exists() and os.path.samefile(path, source):
         raise UsageError(f"{path}: is the input itself; name another output")
     check_writable(path)
@@ -59,6 +64,9 @@ def check_output(path: Path, source: Path | None = None) -> None:
 
 class VideoWriter:
     """Writes frames to an H.264 file: yuv420p, constant rate, faststart.
+
+    With transparency, which H.264 does not know, the codec is QuickTime Animation, which programs that cut
+    films read; it loses nothing.
 
     The file appears at its place when the context ends well; otherwise nothing is left, an older file stays.
 
@@ -73,6 +81,8 @@ class VideoWriter:
         beginning and the container holds its codec, else encoded as AAC, cut to the sample.
     outputs : Outputs, optional
         Group with which the file is placed; alone by default.
+    transparent : bool
+        Whether the frames are RGBA; .mov only.
 
     Attributes
     ----------
@@ -96,16 +106,23 @@ class VideoWriter:
     """
 
     def __init__(
-        self, path: Path, info: VideoInfo, *, audio_from: Path | None = None, outputs: Outputs | None = None
+        self,
+        path: Path,
+        info: VideoInfo,
+        *,
+        audio_from: Path | None = None,
+        outputs: Outputs | None = None,
+        transparent: bool = False,
     ) -> None:
-        check_output(path)
+        check_output(path, endings=[".mov"] if transparent else FORMATS)
         self.path = path
         self.frames = 0
         self.warnings: tuple[str, ...] = ()
         self._info = info
         self._audio_from = audio_from
         self._group = outputs
-        self._pad = (info.height % 2, info.width % 2)
+        self._transparent = transparent
+        self._pad = (0, 0) if transparent else (info.height % 2, info.width % 2)
         if any(self._pad):
             width, height = info.width + self._pad[1], info.height + self._pad[0]
             self._warn(f"padded by one pixel to {width}x{height}: H.264 needs even sides")
@@ -134,7 +151,7 @@ class VideoWriter:
         Parameters
         ----------
         image : (H, W, 3) uint8
-            RGB, of the size promised by ``info``.
+            RGB, of the size promised by ``info``; (H, W, 4) RGBA where it is transparent.
 
         Raises
         ------
@@ -143,7 +160,7 @@ class VideoWriter:
         OutputError
             If ffmpeg has died, for instance because the disk is full.
         """
-        expected = (self._info.height, self._info.width, 3)
+        expected = (self._info.height, self._info.width, 4 if self._transparent else 3)
         if image.shape != expected or image.dtype != np.uint8:
             raise ValueError(f"expected uint8 image of shape {expected}, got {image.dtype} {image.shape}")
         pixels = np.ascontiguousarray(image)
@@ -196,7 +213,10 @@ class VideoWriter:
     def _arguments(self) -> list[str]:
         info = self._info
         width, height = info.width + self._pad[1], info.height + self._pad[0]
-        aspect = f"setsar=sar={info.sample_aspect}:max=65535"
+        filters = f"setsar=sar={info.sample_aspect}:max=65535"
+        encoder, pixels = ["-c:v", "qtrle", "-pix_fmt", "argb"], "rgba"
+        if not self._transparent:
+            filters, encoder, pixels = f"{_COLOURS},{filters}", _ENCODER, "rgb24"
         return [
             *(
                 "-loglevel",
@@ -204,12 +224,12 @@ class VideoWriter:
                 "-f",
                 "rawvideo",
                 "-pix_fmt",
-                "rgb24",
+                pixels,
                 "-video_size",
                 f"{width}x{height}",
             ),
-            *("-framerate", str(info.fps), "-i", "pipe:0", "-vf", f"{_COLOURS},{aspect}"),
-            *(*_ENCODER, "-fps_mode", "passthrough"),
+            *("-framerate", str(info.fps), "-i", "pipe:0", "-vf", filters),
+            *(*encoder, "-fps_mode", "passthrough"),
             *self._destination(self._pictures),
         ]
 
