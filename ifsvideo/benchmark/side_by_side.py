@@ -17,6 +17,7 @@ from ifsvideo.benchmark.runner import Run, in_processes
 from ifsvideo.config import OverlayConfig
 from ifsvideo.output.overlay import OverlayRenderer
 from ifsvideo.output.scenes import Scenes
+from ifsvideo.output.styles import look_of
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import FramePoints, LabelTable, Tracks
 from ifsvideo.video import FrameSource, VideoWriter, open_source
@@ -116,7 +117,7 @@ def write_side_by_side(path: Path, source: FrameSource, truth: LabelTable, resul
     below = info.width > 1.5 * info.height
     both = replace(info, height=2 * info.height) if below else replace(info, width=2 * info.width)
     tables = (truth, result)
-    scenes = [Scenes(info, renderer.config.trail_s) for _ in tables]
+    scenes = [Scenes(info, look_of(renderer.config).trail_s) for _ in tables]
     with VideoWriter(path, both) as writer, closing(source.frames()) as frames:
         for frame, image in enumerate(frames):
             panels = []
