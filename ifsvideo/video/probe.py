@@ -23,6 +23,7 @@ _CONTAINER = re.compile(r"Input #0, ([\w,]+), from")
 _AUDIO = re.compile(r"Stream #0:\d+(?:\[0x[0-9a-f]+\])?(?:\(\w*\))?: Audio: (?!none)(\w+)")
 _HIGHEST_PLAIN_RATE = 240
 """Frames per second above which a nominal rate is doubted: often it is but the clock's (1000, 90000)."""
+_KEY = 1  # AV_PKT_FLAG_KEY
 _DISCARD = 4  # AV_PKT_FLAG_DISCARD: decoded for reference only, as before the first frame of an edit list
 _UNKNOWN_TIME = np.iinfo(np.int64).min  # AV_NOPTS_VALUE
 
@@ -35,6 +36,8 @@ class Packets:
     ----------
     times : (N,) float64
         Seconds from the start of the file, in order of showing.
+    keys : (K,) float64
+        Those of the key frames among them.
     exact : bool
         Whether these are times of showing; else of decoding, as in AVI.
     end : float
@@ -44,6 +47,7 @@ class Packets:
     """
 
     times: Floats
+    keys: Floats
     exact: bool
     end: float
     cut_off: bool
@@ -127,6 +131,11 @@ def count_frames(path: Path) -> int:
     return len(_list_packets(["-i", ffmpeg.file_url(path), "-map", VIDEO_STREAM]).times)
 
 
+def key_frames(path: Path) -> Floats:
+    """Times (K,) of the key frames, seconds from the start of the file; none where it cannot be read."""
+    return _list_packets(["-i", ffmpeg.file_url(path), "-map", VIDEO_STREAM]).keys
+
+
 def audio_codec(path: Path) -> str | None:
     """ffmpeg's name of the codec of the first sound stream, None where there is none."""
     _, _, printed = ffmpeg.run(["-i", ffmpeg.file_url(path)])
@@ -165,16 +174,17 @@ def _list_packets(source: list[str]) -> Packets:
     _, listing, printed = ffmpeg.run([*source, "-c", "copy", "-f", "framecrc", "-"])
     base = re.search(r"^#tb 0: (\d+/\d+)$", listing, re.MULTILINE)
     rows = [line.split(",") for line in listing.splitlines() if line.startswith("0,")]
-    rows = [row for row in rows if len(row) >= 6 and not _discarded(row)]
+    rows = [row for row in rows if len(row) >= 6 and not _flags(row) & _DISCARD]
     if base is None or not rows:
-        return Packets(np.zeros(0), exact=False, end=0.0, cut_off=False)
+        return Packets(np.zeros(0), np.zeros(0), exact=False, end=0.0, cut_off=False)
     tick = float(Fraction(base[1]))
     decoding, showing = (np.array([int(row[column]) for row in rows], dtype=np.int64) for column in (1, 2))
     exact = bool((showing != _UNKNOWN_TIME).all())
-    times = np.sort(showing if exact else decoding) * tick
+    clock = (showing if exact else decoding) * tick
+    times, keys = np.sort(clock), np.sort(clock[[_flags(row) & _KEY != 0 for row in rows]])
     end = float(times[-1]) + int(rows[-1][3]) * tick
     cut_off = any(re.search(r"partial file|ended prematurely", line) for line in printed)
-    return Packets(times, exact, max(end, _duration(printed)) if cut_off else end, cut_off)
+    return Packets(times, keys, exact, max(end, _duration(printed)) if cut_off else end, cut_off)
 
 
 def _duration(printed: list[str]) -> float:
@@ -184,9 +194,9 @@ def _duration(printed: list[str]) -> float:
     return 3600 * hours + 60 * minutes + seconds
 
 
-def _discarded(row: list[str]) -> bool:
-    flags = next((int(cell.split("=")[1], 16) for cell in row[6:] if cell.strip().startswith("F=")), 0)
-    return bool(flags & _DISCARD)
+def _flags(row: list[str]) -> int:
+    """A packet's flags; framecrc leaves them out where a packet is a key frame and nothing else."""
+    return next((int(cell.split("=")[1], 16) for cell in row[6:] if cell.strip().startswith("F=")), _KEY)
 
 
 def _plausible(nominal: Fraction, times: Floats) -> Fraction:
