@@ -17,7 +17,9 @@ from ifsvideo.clip import as_tracks
 from ifsvideo.config import Config, ObjectsConfig, OverlayConfig, TrackerConfig
 from ifsvideo.config_file import load_config
 from ifsvideo.errors import IfsVideoError, InputError, OutputError, UsageError
+from ifsvideo.objects.history import Event, ObjectTable
 from ifsvideo.output.overlay import OverlayRenderer
+from ifsvideo.output.products import Products
 from ifsvideo.pipeline import Pipeline
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.segmenter import IFSSegmenter
@@ -41,6 +43,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Config",
+    "Event",
     "FramePoints",
     "IFSSegmenter",
     "IfsVideoError",
@@ -48,11 +51,13 @@ __all__ = [
     "KltTracker",
     "LabelTable",
     "MovingObject",
+    "ObjectTable",
     "ObjectsConfig",
     "OutputError",
     "OverlayConfig",
     "OverlayRenderer",
     "Pipeline",
+    "Products",
     "Renderer",
     "Result",
     "Scene",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import NoReturn, TypeVar, get_args, get_type_hints
@@ -16,6 +16,7 @@ from ifsvideo.config_file import load_config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, parse_area
 from ifsvideo.lens import check_k1
+from ifsvideo.output.products import Products
 from ifsvideo.video import parse_time
 
 _Value = TypeVar("_Value")
@@ -40,6 +41,7 @@ class Job:
     source: Path
     output: Path | None
     labels: Path
+    products: Products
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ def parse(argv: Sequence[str] | None = None) -> Arguments:
     """
     told = _parser().parse_args(argv)
     return Arguments(
-        jobs=_jobs(told.input, told.output, told.labels),
+        jobs=_jobs(told.input, told.output, told.labels, _products(told)),
         config=_config(told),
         fps=told.fps,
         start=told.start,
@@ -96,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     _add_files(parser)
+    _add_products(parser)
     _add_reading(parser)
     _add_finding(parser)
     _add_showing(parser)
@@ -118,6 +121,23 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "--labels", type=Path, metavar="FILE", help="label of every point (default: .csv beside the overlay)"
     )
+
+
+def _add_products(parser: argparse.ArgumentParser) -> None:
+    products = parser.add_argument_group("further outputs")
+    for option, place, text in (
+        (
+            "--objects",
+            "FILE",
+            ".csv: box, velocity, growth and time to contact of every object in every frame",
+        ),
+        ("--json", "FILE", ".json: summary with objects, events, settings, versions, timings and warnings"),
+        ("--clips", "DIR", "the seconds round each event, cut out of the video"),
+        ("--masks", "DIR", "a mask for every frame: PNGs whose pixels are the objects' numbers"),
+        ("--mot", "FILE", ".txt: the boxes as MOTChallenge rows"),
+        ("--tracks", "FILE", ".npz: every track; can be the input of another run"),
+    ):
+        products.add_argument(option, type=Path, metavar=place, help=text)
 
 
 def _add_reading(parser: argparse.ArgumentParser) -> None:
@@ -271,11 +291,19 @@ def _overlay(told: argparse.Namespace, config: OverlayConfig) -> OverlayConfig:
     return replace(config, **{name: wish for name, wish in wishes.items() if wish is not None})
 
 
-def _jobs(sources: Sequence[Path], output: Path | None, labels: Path | None) -> tuple[Job, ...]:
+def _products(told: argparse.Namespace) -> Products:
+    """Places of the further outputs; only the summary's option has a name of its own."""
+    names = {item.name for item in fields(Products)} - {"summary"}
+    return Products(summary=told.json, **{name: getattr(told, name) for name in names})
+
+
+def _jobs(
+    sources: Sequence[Path], output: Path | None, labels: Path | None, products: Products
+) -> tuple[Job, ...]:
     """What is written of each input."""
-    if len(sources) > 1 and (output or labels):
-        raise UsageError("-o and --labels name one file; give one input, or leave them out")
-    jobs = tuple(_job(source, output, labels) for source in sources)
+    if len(sources) > 1 and (output or labels or any(products.named())):
+        raise UsageError("-o and the like name one file; give one input, or leave them out")
+    jobs = tuple(_job(source, output, labels, products) for source in sources)
     places = [job.labels for job in jobs]
     twice = next((place for place in places if places.count(place) > 1), None)
     if twice is not None:
@@ -283,12 +311,12 @@ def _jobs(sources: Sequence[Path], output: Path | None, labels: Path | None) -> 
     return jobs
 
 
-def _job(source: Path, output: Path | None, labels: Path | None) -> Job:
+def _job(source: Path, output: Path | None, labels: Path | None, products: Products) -> Job:
     if output is not None and not output.name:
         raise UsageError("-o needs the name of a file, such as out.mp4")
     if output is None:
         place = source if source.name else source.resolve()
         output = place.with_name(f"{place.name if place.is_dir() else place.stem}.ifs.mp4")
         if is_tracks_file(source):
-            return Job(source, None, labels or output.with_suffix(".csv"))
-    return Job(source, output, labels or output.with_suffix(".csv"))
+            return Job(source, None, labels or output.with_suffix(".csv"), products)
+    return Job(source, output, labels or output.with_suffix(".csv"), products)

@@ -84,6 +84,7 @@ def _process(pipeline: Pipeline, job: Job, arguments: Arguments) -> None:
             end=arguments.end,
             ignore=arguments.ignore,
             motions=arguments.motions,
+            products=job.products,
             progress=bars.show,
         )
     if not arguments.quiet:

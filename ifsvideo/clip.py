@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.errors import UsageError
 from ifsvideo.output.atomic import check_writable
+from ifsvideo.output.products import Products, same_place
 from ifsvideo.tracking.files import load_trajectories
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import Tracks, VideoInfo
@@ -93,13 +93,13 @@ def open_clip(source: Source, fps: Fraction | None, start: float, end: float | N
     return Clip(name, info, path, trajectories=replace(points, fps=float(info.fps)))
 
 
-def check_outputs(clip: Clip, video: Path | None, labels: Path | None) -> None:
+def check_outputs(clip: Clip, video: Path | None, labels: Path | None, products: Products) -> None:
     """Refuse outputs before any work is done.
 
     Raises
     ------
     UsageError
-        If an output is the input or the other output, has an unknown ending, or needs pictures.
+        If an output is the input or another output, has an unknown ending, or needs what the input lacks.
     OutputError
         If it cannot be written.
     """
@@ -109,15 +109,13 @@ def check_outputs(clip: Clip, video: Path | None, labels: Path | None) -> None:
         check_output(video, clip.path)
     if labels is not None:
         for other, what in ((clip.path, "the input itself"), (video, "the video too")):
-            if other is not None and _same(labels, other):
+            if other is not None and same_place(labels, other):
                 raise UsageError(f"{labels}: is {what}; name another file for the labels")
         check_writable(labels)
-
-
-def _same(one: Path, other: Path) -> bool:
-    if one.exists() and other.exists():
-        return os.path.samefile(one, other)
-    return os.path.realpath(one) == os.path.realpath(other)
+    if products.clips is not None and not (clip.frames and clip.path and clip.path.is_file()):
+        raise UsageError(f"{clip.name}: is no video file to cut clips out of; leave out the clips")
+    taken = {"the input itself": clip.path, "the video too": video, "the labels too": labels}
+    products.check({what: path for what, path in taken.items() if path is not None})
 
 
 def _info_of(points: Trajectories, fps: Fraction | None) -> VideoInfo:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
@@ -25,6 +25,7 @@ from ifsvideo.output.atomic import Outputs
 from ifsvideo.output.labels import LabelSink
 from ifsvideo.output.overlay import OverlayRenderer
 from ifsvideo.output.overlay_video import OverlaySink, check_wishes
+from ifsvideo.output.products import Products, ProductsSink
 from ifsvideo.output.scenes import Scenes
 from ifsvideo.output.styles import look_of
 from ifsvideo.segmentation.segmenter import IFSSegmenter
@@ -94,6 +95,7 @@ class Pipeline:
         ignore: Sequence[Area] = (),
         motions: int | None = None,
         audio: bool = True,
+        products: Products | None = None,
         progress: Progress | None = None,
     ) -> Result:
         """Run all stages over one clip; frames are never all held in memory.
@@ -115,6 +117,8 @@ class Pipeline:
             Number of motions, the background's included, where it is known.
         audio : bool, optional
             Whether the video keeps the sound.
+        products : Products, optional
+            Places of further outputs: objects, masks, tracks, clips, a summary.
         progress : callable, optional
             ``progress(stage, done, total)``, called after every step.
 
@@ -131,7 +135,10 @@ class Pipeline:
         if motions is not None and motions < 1:
             raise UsageError(f"motions must be at least 1, got {motions}")
         clip = open_clip(source, _exact(fps), start, end)
-        check_outputs(clip, video, csv)
+        products = products or Products()
+        if products.clips is not None and fps is not None:
+            raise UsageError("clips are cut by the video's own times; leave out fps, or the clips")
+        check_outputs(clip, video, csv, products)
         if video is not None:
             check_wishes(video, self.config.overlay)
         if ignore and clip.frames is None:
@@ -145,7 +152,8 @@ class Pipeline:
             table = LabelTable(
                 trajectories.frame, trajectories.ids, trajectories.xy, found, trajectories.frames
             )
-            sinks: list[Sink] = []
+            further = ProductsSink(products, clip.info, clip.path, outputs)
+            sinks: list[Sink] = [further] if any(products.named()) else []
             if csv is not None:
                 sinks.append(LabelSink(csv, outputs))
             if video is not None:
@@ -155,9 +163,14 @@ class Pipeline:
             self._feed(sinks, clip, table, log)
             if video is not None:
                 log.warnings.extend(overlay.warnings)
-        log.warnings[:0] = [*(clip.frames.warnings if clip.frames else ()), *_remarks(table)]
-        objects = _objects(table, clip.info)
-        return Result(clip.info, table, objects, video, csv, tuple(log.warnings), log.seconds)
+            log.warnings.extend(further.warnings)
+            log.warnings[:0] = [*(clip.frames.warnings if clip.frames else ()), *_remarks(table)]
+            objects = _objects(table, clip.info)
+            result = Result(clip.info, table, objects, video, csv, tuple(log.warnings), log.seconds)
+            result = further.described(result)
+            told = {"motions": motions, "fps": fps, "start": start, "end": end, "ignore": list(ignore)}
+            further.summarise(result, {**told, "config": asdict(self.config)})
+        return result
 
     def _track(self, source: FrameSource | None, mask: Bools | None, log: _Log) -> Trajectories:
         assert source is not None, "a clip without trajectories has frames"

@@ -8,7 +8,7 @@ from ifsvideo.output.legend import clock
 from ifsvideo.types import Result
 
 _SHOWN = 12
-"""Objects listed one by one; the CSV has all."""
+"""Objects, and events, listed one by one; the files have all."""
 
 
 def summary(name: str, result: Result, seconds: float) -> str:
@@ -29,7 +29,11 @@ def summary(name: str, result: Result, seconds: float) -> str:
     if len(result.objects) > _SHOWN:
         lines.append(f"  and {len(result.objects) - _SHOWN} more")
     lines.append(f"  points      {_points(result)}")
-    lines += [f"  wrote       {path}" for path in (result.output, result.labels) if path is not None]
+    lines += [f"  {clock(event.time_s):<11} {event.text}" for event in result.events[:_SHOWN]]
+    if len(result.events) > _SHOWN:
+        lines.append(f"  and {len(result.events) - _SHOWN} more events")
+    written = (result.output, result.labels, *result.further)
+    lines += [f"  wrote       {path}" for path in written if path is not None]
     lines.append(f"  speed       {_speed(result, seconds)}")
     lines += [f"  warning     {text}" for text in result.warnings]
     return "\n".join(lines)

@@ -9,10 +9,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ifsvideo.objects.history import Event, ObjectTable
 
 BACKGROUND = 0
 """Label of the static world."""
@@ -290,6 +293,11 @@ class Result:
     warnings : tuple of str
         What a user should know: frames missing, a side padded, no corner found.
     seconds : mapping of stage name to seconds spent.
+    events : tuple of Event, by time
+    history : ObjectTable or None
+        A row for every object and frame. This and the events are there where further outputs were asked for.
+    further : tuple of Path
+        These outputs.
     """
 
     info: VideoInfo
@@ -299,6 +307,9 @@ class Result:
     labels: Path | None
     warnings: tuple[str, ...]
     seconds: Mapping[str, float]
+    events: tuple[Event, ...] = ()
+    history: ObjectTable | None = None
+    further: tuple[Path, ...] = ()
 
 
 class Tracker(Protocol):

@@ -1,22 +1,28 @@
-"""What else a run writes beside overlay and labels: one optional place for each."""
+"""What a run writes beside overlay and labels: one optional place for each, and the sink that fills them."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 from ifsvideo.errors import UsageError
-from ifsvideo.output.atomic import check_writable
+from ifsvideo.objects.history import Event, ObjectHistory
+from ifsvideo.output import event_clips, masks
+from ifsvideo.output.atomic import Outputs, check_folder, check_writable
+from ifsvideo.output.event_clips import write_clips
+from ifsvideo.output.masks import MaskSink
+from ifsvideo.output.object_tables import write_mot, write_objects
+from ifsvideo.output.summary_json import summary_document, write_summary
+from ifsvideo.output.tracks_npz import TracksSink
+from ifsvideo.types import Image, Result, Scene, Sink, VideoInfo
 
-ENDINGS = {
-    "objects": (".csv",),
-    "mot": (".txt",),
-    "summary": (".json",),
-    "tracks": (".npz",),
-}
-"""How the files may end; what is not named here is a folder."""
+ENDINGS = {"objects": ".csv", "mot": ".txt", "summary": ".json", "tracks": ".npz"}
+"""How the files end."""
+FOLDERS = {"masks": masks.OWN_FILES, "clips": event_clips.OWN_FILES}
+"""Pattern of what an earlier run wrote into the folders."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +31,12 @@ class Products:
 
     Attributes
     ----------
-    objects : CSV with a row for every object and frame (`ifsvideo.output.objects_csv`).
+    objects : CSV with a row for every object and frame (`ifsvideo.objects.history.ObjectTable`).
     mot : the objects' boxes as MOTChallenge rows (.txt).
     summary : JSON with input, settings, versions, timings, objects, events and warnings.
     masks : folder of indexed PNGs, one a frame.
-    tracks : NumPy archive (.npz) with every track, which the command takes as input again.
-    clips : folder of the seconds round each event, cut out of the input.
+    tracks : NumPy archive (.npz) with every track, which `Pipeline` takes as input again.
+    clips : folder of the seconds round each event, cut out of the video.
     """
 
     objects: Path | None = None
@@ -45,14 +51,14 @@ class Products:
         for item in fields(self):
             path = getattr(self, item.name)
             if path is not None:
-                yield item.name, path
+                yield item.name, Path(path)
 
-    def check(self, taken: dict[str, Path]) -> None:
+    def check(self, taken: Mapping[str, Path]) -> None:
         """Refuse places before any work is done.
 
         Parameters
         ----------
-        taken : mapping of a name for people ("the input itself") to a place that must stay free.
+        taken : mapping of what it is, for people ("the input itself"), to a place that must stay free.
 
         Raises
         ------
@@ -63,16 +69,16 @@ class Products:
         """
         places = dict(taken)
         for name, path in self.named():
-            endings = ENDINGS.get(name)
-            if endings and path.suffix.lower() not in endings:
-                raise UsageError(
-                    f"{path}: unknown ending {path.suffix!r}; {name} end in {' or '.join(endings)}"
-                )
+            ending = ENDINGS.get(name)
+            if ending is not None and path.suffix.lower() != ending:
+                raise UsageError(f"{path}: unknown ending {path.suffix!r}; the {name} go to a {ending} file")
             for what, other in places.items():
                 if same_place(path, other):
                     raise UsageError(f"{path}: is {what}; name another place for the {name}")
             places[f"the {name} too"] = path
-            if endings:
+            if name in FOLDERS:
+                check_folder(path, FOLDERS[name])
+            else:
                 check_writable(path)
 
 
@@ -81,3 +87,92 @@ def same_place(one: Path, other: Path) -> bool:
     if one.exists() and other.exists():
         return os.path.samefile(one, other)
     return os.path.realpath(one) == os.path.realpath(other)
+
+
+class ProductsSink:
+    """Fills the places (a `Sink`); what is told of whole objects follows when the last frame was seen.
+
+    Parameters
+    ----------
+    products : Products
+    info : VideoInfo
+    source : Path or None
+        The input, where it was read from disk; clips are cut out of it.
+    outputs : Outputs
+        Group with which all of it is placed.
+
+    Attributes
+    ----------
+    history : ObjectHistory
+    warnings : tuple of str
+        Complete after `finish`.
+    """
+
+    def __init__(self, products: Products, info: VideoInfo, source: Path | None, outputs: Outputs) -> None:
+        self.history = ObjectHistory(info)
+        self._products = products
+        self._source = source
+        self._outputs = outputs
+        self._frames = 0
+        self._clip_of: dict[Event, str] = {}
+        self._masks = MaskSink(products.masks, info, outputs) if products.masks else None
+        tracks = TracksSink(products.tracks, info, outputs) if products.tracks else None
+        self._sinks: list[Sink] = [sink for sink in (self.history, self._masks, tracks) if sink is not None]
+
+    @property
+    def wants_image(self) -> bool:
+        """See `ifsvideo.types.Sink`."""
+        return any(sink.wants_image for sink in self._sinks)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """See the class."""
+        return self._masks.warnings if self._masks else ()
+
+    def add(self, scene: Scene, image: Image | None) -> None:
+        """See `ifsvideo.types.Sink`."""
+        self._frames += 1
+        for sink in self._sinks:
+            sink.add(scene, image)
+
+    def finish(self) -> None:
+        """See `ifsvideo.types.Sink`."""
+        for sink in self._sinks:
+            sink.finish()
+        places, table = self._products, self.history.table
+        if places.objects:
+            write_objects(places.objects, table, self._outputs)
+        if places.mot:
+            write_mot(places.mot, table, self._outputs)
+        if places.clips and self._source:
+            self._clip_of = write_clips(places.clips, self._source, self.history.events, self._outputs)
+
+    def described(self, result: Result) -> Result:
+        """The result with what was found out of the objects, and where it was written."""
+        places = tuple(path for _, path in self._products.named())
+        if not places:
+            return result
+        return replace(result, events=self.history.events, history=self.history.table, further=places)
+
+    def summarise(self, result: Result, settings: Mapping[str, Any]) -> None:
+        """Write the summary, where one is wanted; the last of all, as it tells of the others.
+
+        Parameters
+        ----------
+        result : Result
+        settings : mapping
+            What the run was told, by name; anything that is no JSON is written as its text.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        places = self._products
+        if places.summary is None:
+            return
+        written = {"overlay": result.output, "labels": result.labels, **dict(places.named())}
+        document = summary_document(
+            result, self._source, self._frames, self.history, self._clip_of, settings, written
+        )
+        write_summary(places.summary, document, self._outputs)

@@ -13,8 +13,8 @@ from ifsvideo.video.writer import FORMATS
 _EARLY_S = 1.0
 """How much too early a piece may begin, seconds, to begin with a key frame and be copied as it is."""
 _CLOCK_S = 0.001
-"""By how much clocks may round: copying looks for a key frame as much later, to find it and not the one before,
-encoding begins as much earlier, not to lose a frame."""
+"""By how much clocks may round, seconds: copying looks for a key frame as much later, to find it and not the
+one before, encoding begins as much earlier, not to lose a frame."""
 _EXACTLY = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-threads", "2"]
 _SOUND = ["-c:a", "aac", "-b:a", "160k"]
 
