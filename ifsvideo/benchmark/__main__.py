@@ -6,9 +6,10 @@ tracks      DIR or its subfolders hold tracks of your own, NAME.npz: xy (F, P, 2
             optional visible (F, P), labels (P,) integers: groups from 1, 0 not known; or .mat as above
 samples     DIR holds NAME.mp4 and NAME_truth.npz (masks (F, H, W) uint8: 0 background, k object k)
 
-and, with options of their own (static --help),
+and, with options of their own (static --help, marked --help),
 
 static CLIP ...  clips in which nothing moves: how much is called moving, or not decided
+marked CLIP ...  real clips in which what moves was marked by hand: how much of it is found, and what besides
 
 Scoring of hopkins155, kt3dmoseg and tracks. Error of one sequence, per cent: 100 x (1 - the greatest number
 of points that a one-to-one matching of estimated to true labels gets right / labelled points), -1 counting
@@ -52,7 +53,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ifsvideo.benchmark import comparison, datasets, driving, learning, learning_data, samples, static, table
+from ifsvideo.benchmark import (
+    comparison,
+    datasets,
+    driving,
+    learning,
+    learning_data,
+    marked,
+    samples,
+    static,
+    table,
+)
 from ifsvideo.benchmark.comparison import Method, Trial
 from ifsvideo.benchmark.datasets import LabelledSequence
 from ifsvideo.benchmark.learning_data import Example
@@ -97,6 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run, options = _learn, _learning_parser().parse_args(line[1:])
     elif line[:1] == ["static"]:
         run, options = static.measure, static.parser().parse_args(line[1:])
+    elif line[:1] == ["marked"]:
+        run, options = marked.measure, marked.parser().parse_args(line[1:])
     else:
         run, options = _measure, _parser().parse_args(line)
     signal.signal(signal.SIGTERM, _terminate)
