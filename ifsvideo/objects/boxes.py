@@ -13,12 +13,12 @@ _REACH = 0.045
 """Distance between neighbours that is bridged, share of the diagonal, as of the outline that is drawn."""
 _TRIMMED = 2.0
 """Per cent of the points beyond each side: corners of the ground that ride along outside the outline."""
-_MARGIN = 0.004
-"""Distance of the outermost corners to the object's outline, share of the diagonal: 3 px at 640x360."""
+_MARGIN = 0.006
+"""Distance of the outermost corners to the object's outline, share of the diagonal: 4 px at 640x360."""
 _BORDER = 0.015
 """A side nearer to the picture's edge than this, share of the diagonal, lies on it: corners are not tracked
 up to the edge."""
-_STEADY_S = 0.15
+_STEADY_S = 0.3
 """Seconds to either side over whose boxes the median is taken."""
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 
 from ifsvideo.objects.boxes import point_box, steady_boxes
 from ifsvideo.objects.contact import contact, stretch
-from ifsvideo.objects.kinematics import steps, velocity
-from ifsvideo.types import BACKGROUND, Bools, FramePoints, Image, Ints, Scene, VideoInfo
+from ifsvideo.objects.events import Sights, events_of, split
+from ifsvideo.objects.kinematics import foot_step, steps, velocity
+from ifsvideo.objects.standing import Standing
+from ifsvideo.objects.table import Event, ObjectTable
+from ifsvideo.types import BACKGROUND, FramePoints, Image, Scene, VideoInfo
+
+__all__ = ["Event", "ObjectHistory", "ObjectTable"]
 
 _THUMBNAIL = 160
 """Longer side of a thumbnail, pixels: a table's row on a screen of twice the usual density."""
@@ -20,103 +25,6 @@ _SURROUNDINGS = 0.15
 """What of the picture round the box a thumbnail shows, share of the box."""
 _BETTER = 1.2
 """How much larger than the last thumbnail's an object's box must be for a new one to be taken."""
-
-
-@dataclass(frozen=True)
-class ObjectTable:
-    """One row for every object and frame in which it is seen, ordered by frame, then object.
-
-    Lengths are pixels of the upright picture; NaN where nothing can be said.
-
-    Attributes
-    ----------
-    frame : (N,) int32, from 0.
-    time_s : (N,) float64, seconds of the input.
-    object : (N,) int32, number of the object, 1, 2, ...
-    points : (N,) int32, points seen on it.
-    left, top, width, height : (N,) float32
-        Box round the object. Its sides lie between pixels' middles: a box over all of a 640x360 picture has
-        left -0.5, top -0.5, width 640, height 360.
-    cx, cy : (N,) float32, middle of the box.
-    vx, vy : (N,) float32
-        Velocity against the background around it, pixels per second.
-    scale_rate : (N,) float32
-        Growth of its lengths in the picture, 1/s: 0.5 is half as long again per second; below 0 it shrinks.
-    ttc_s : (N,) float32
-        Time to contact, seconds: until it reaches the camera's plane if it goes on as it does. NaN unless it
-        grows beyond noise.
-    ttc_confidence : (N,) float32
-        How sure it is that it grows, 0 to 1; 0 where ``ttc_s`` is NaN.
-    """
-
-    frame: NDArray[np.int32]
-    time_s: NDArray[np.float64]
-    object: NDArray[np.int32]
-    points: NDArray[np.int32]
-    left: NDArray[np.float32]
-    top: NDArray[np.float32]
-    width: NDArray[np.float32]
-    height: NDArray[np.float32]
-    cx: NDArray[np.float32]
-    cy: NDArray[np.float32]
-    vx: NDArray[np.float32]
-    vy: NDArray[np.float32]
-    scale_rate: NDArray[np.float32]
-    ttc_s: NDArray[np.float32]
-    ttc_confidence: NDArray[np.float32]
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            shape = getattr(self, item.name).shape
-            if shape != (len(self.frame),):
-                raise ValueError(f"expected {item.name} of shape ({len(self.frame)},), got {shape}")
-        if (np.diff(self.frame) < 0).any():
-            raise ValueError("rows must be ordered by frame")
-
-    @classmethod
-    def empty(cls) -> ObjectTable:
-        """A table without a row."""
-        columns = [np.empty(0, np.float32) for _ in range(len(fields(cls)) - 4)]
-        whole = np.empty(0, np.int32)
-        return cls(whole, np.empty(0, np.float64), whole, whole, *columns)
-
-    def __len__(self) -> int:
-        return len(self.frame)
-
-    @property
-    def numbers(self) -> list[int]:
-        """The objects' numbers, in order."""
-        return [int(number) for number in np.unique(self.object)]
-
-    def of(self, number: int) -> ObjectTable:
-        """The rows of one object."""
-        return self.select(self.object == number)
-
-    def select(self, rows: Bools | Ints) -> ObjectTable:
-        """Some of the rows: a mask (N,) or ascending indices."""
-        return ObjectTable(*(getattr(self, item.name)[rows] for item in fields(self)))
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened to an object.
-
-    Attributes
-    ----------
-    frame : int, from 0.
-    time_s : float, seconds of the input.
-    object : int, number of the object.
-    kind : str
-        One of `ifsvideo.objects.events.KINDS`.
-    text : str
-        A sentence for people, without the time: "object 3 overtakes on the left".
-    """
-
-    frame: int
-    time_s: float
-    object: int
-    kind: str
-    text: str
 
 
 @dataclass(frozen=True)
@@ -130,6 +38,7 @@ class _Sight:
     own: NDArray[np.float64]
     around: NDArray[np.float64]
     stretch: NDArray[np.float64]
+    foot: float
 
 
 class ObjectHistory:
@@ -160,6 +69,8 @@ class ObjectHistory:
         self._info = info
         self._diagonal = float(np.hypot(info.width, info.height))
         self._before = FramePoints(np.empty(0, np.int64), np.empty((0, 2), np.float32))
+        self._standing = Standing(float(info.fps))
+        self._frames = 0
         self._sights: dict[int, list[_Sight]] = {}
         self._extent: dict[int, float] = {}
 
@@ -172,24 +83,41 @@ class ObjectHistory:
             on_it = scene.labels == number
             both = on_it & known
             own, around = steps(before[both], scene.xy[both], before[ground], scene.xy[ground])
-            sight = _Sight(
-                scene.frame,
-                scene.time_s,
-                int(np.count_nonzero(on_it)),
-                point_box(scene.xy[on_it], self._diagonal),
-                own,
-                around,
-                stretch(before[both], scene.xy[both]),
-            )
+            box = point_box(scene.xy[on_it], self._diagonal)
+            grown = stretch(before[both], scene.xy[both])
+            foot = foot_step(own, grown[0], scene.xy[both], box, before[ground], scene.xy[ground])
+            points = int(np.count_nonzero(on_it))
+            sight = _Sight(scene.frame, scene.time_s, points, box, own, around, grown, foot)
             self._sights.setdefault(number, []).append(sight)
             if image is not None and self.wants_image:
                 self._keep_thumbnail(number, sight.box, image)
         self._before = FramePoints(scene.ids, scene.xy)
+        self._standing.add(scene)
+        self._frames += 1
 
     def finish(self) -> None:
         """Make the table and the events."""
-        self.table = _joined(self._rows(number, sights) for number, sights in self._sights.items())
-        self.events = ()
+        tables = {number: self._rows(number, sights) for number, sights in self._sights.items()}
+        self.table = ObjectTable.joined(tables.values())
+        found = [event for number, rows in tables.items() for event in self._events(number, rows)]
+        self.events = tuple(sorted(found, key=lambda event: (event.frame, event.object)))
+
+    def _events(self, number: int, rows: ObjectTable) -> Iterator[Event]:
+        """What happened to one object."""
+        foot = np.array([sight.foot for sight in self._sights[number]])
+        around = np.array([np.hypot(*sight.around) for sight in self._sights[number]])
+        for stretch_of in split(rows.frame, float(self._info.fps)):
+            seen = rows.select(np.arange(len(rows))[stretch_of])
+            first, last = (number, int(seen.frame[0])), (number, int(seen.frame[-1]))
+            sights = Sights(
+                seen,
+                foot[stretch_of],
+                around[stretch_of],
+                self._standing.before.get(first, 0.0),
+                self._standing.after.get(last, 0.0),
+                again=stretch_of.start > 0,
+            )
+            yield from events_of(sights, self._info, self._frames)
 
     def _rows(self, number: int, sights: list[_Sight]) -> ObjectTable:
         """The table of one object."""
@@ -232,14 +160,3 @@ class ObjectHistory:
         size = (max(1, round(shrink * cut.shape[1])), max(1, round(shrink * cut.shape[0])))
         self.thumbnails[number] = np.asarray(cv2.resize(cut, size, interpolation=cv2.INTER_AREA), np.uint8)
         self._extent[number] = extent
-
-
-def _joined(tables: Iterable[ObjectTable]) -> ObjectTable:
-    """One table of several, ordered."""
-    parts = [ObjectTable.empty(), *tables]
-    columns = {
-        item.name: np.concatenate([getattr(part, item.name) for part in parts])
-        for item in fields(ObjectTable)
-    }
-    order = np.lexsort((columns["object"], columns["frame"]))
-    return ObjectTable(**{name: column[order] for name, column in columns.items()})

@@ -19,6 +19,8 @@ REACH_S = 0.3
 grow beyond their noise, short enough for its speed to be steady."""
 _LEAST_OWN = 3
 """Fewest points whose median step is taken for the object's."""
+_FOOT = 0.25
+"""How far above or below an object's foot the ground is looked at, share of the object's height."""
 _LEAST_AROUND = 8
 """Fewest points of the background that must be in sight."""
 _AROUND = 24
@@ -52,6 +54,42 @@ def steps(
         near = np.argpartition(distance, count - 1)[:count]
         around = np.median(ground_after[near] - ground_before[near], axis=0).astype(np.float64)
     return own, around
+
+
+def foot_step(
+    own: Floats, growth: float, after: Floats, box: Floats, ground_before: Floats, ground_after: Floats
+) -> float:
+    """How far an object's foot goes down the picture between two frames, beside the ground there.
+
+    The ground at the foot's height in the picture is as far away as the object, where the ground is flat. So
+    this is above 0 for what comes towards us over the ground, below it for what goes our way.
+
+    Parameters
+    ----------
+    own : (2,) float
+        As of `steps`.
+    growth : float
+        Logarithm of the growth of the object's lengths; NaN where not known.
+    after : (N, 2) float
+        The object's points, pixels.
+    box : (4,) float
+        Left, top, right, bottom, pixels.
+    ground_before, ground_after : (M, 2) float
+        The background's points seen in both frames.
+
+    Returns
+    -------
+    float
+        Pixels; NaN where nothing can be said.
+    """
+    left, top, right, bottom = box.tolist()
+    width, height = right - left, bottom - top
+    x, y = np.asarray(ground_after).T
+    beside = (np.abs(y - bottom) < _FOOT * height) & (x > left - width) & (x < right + width)
+    if np.count_nonzero(beside) < _LEAST_OWN or not len(after):
+        return float("nan")
+    foot = own[1] + growth * (bottom - np.median(after[:, 1]))
+    return float(foot - np.median((ground_after - ground_before)[beside, 1]))
 
 
 @dataclass(frozen=True)
