@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,8 +80,7 @@ class Sights:
 def split(frame: NDArray[np.int32], fps: float) -> list[slice]:
     """The stretches without a gap of an object's rows, by their frames (N,), ascending."""
     cuts = np.flatnonzero(np.diff(frame) > _GAP_S * fps) + 1
-    bounds = [0, *cuts.tolist(), len(frame)]
-    return [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(frame)])]
 
 
 def events_of(sights: Sights, info: VideoInfo, frames: int) -> Iterator[Event]:
@@ -148,15 +148,16 @@ def _passing(sights: Sights, borders: NDArray[np.bool_], info: VideoInfo) -> tup
     if rows.frame[0] <= _EDGE_S * fps or not touched.any():
         return None
     side = int(np.argmax(touched))
-    clear = np.flatnonzero(~borders[:, side])
-    clear = clear[clear > np.flatnonzero(borders[:start, side])[-1]]
-    if not len(clear):
+    at_edge = np.flatnonzero(borders[:, side])
+    gone = at_edge[np.diff(at_edge, append=len(rows)) > _EDGE_S * fps]
+    if not len(gone):
         return None
-    after = slice(0, int(clear[0]) + round(fps))
+    whole = int(gone[0]) + 1
+    after = slice(0, whole + round(fps))
     goes_our_way = _median(sights.foot[after]) < 0
     recedes = _median(rows.scale_rate[after]) < -_RECEDES
     moving = _median(sights.around[after]) * fps > _STILL * np.hypot(info.width, info.height)
-    return (int(clear[0]), _SIDES[side]) if goes_our_way and recedes and moving else None
+    return (whole, _SIDES[side]) if goes_our_way and recedes and moving else None
 
 
 def _falls_behind(sights: Sights, side: str, fps: float) -> bool:
@@ -199,12 +200,8 @@ def _leaving(rows: ObjectTable, borders: NDArray[np.bool_], info: VideoInfo) -> 
     """Side on which it left the picture; None if it did not leave over the edge."""
     last = len(borders)
     seconds = np.arange(1 - last, 1) / float(info.fps)
-    outwards = (
-        -rows.cx[-last:],
-        rows.cx[-last:] - info.width,
-        -rows.cy[-last:],
-        rows.cy[-last:] - info.height,
-    )
+    cx, cy = rows.cx[-last:], rows.cy[-last:]
+    outwards = (-cx, cx - info.width, -cy, cy - info.height)
     best, found = 0.0, None
     for side, beyond in zip(_SIDES, outwards, strict=True):
         speed = np.polyfit(seconds, beyond, 1)[0] if last > 1 else 0.0

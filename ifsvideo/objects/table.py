@@ -73,9 +73,8 @@ class ObjectTable:
     def joined(cls, tables: Iterable[ObjectTable]) -> ObjectTable:
         """All rows of several tables, ordered."""
         parts = [cls.empty(), *tables]
-        columns = {
-            item.name: np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)
-        }
+        names = [item.name for item in fields(cls)]
+        columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         order = np.lexsort((columns["object"], columns["frame"]))
         return cls(**{name: column[order] for name, column in columns.items()})
 
