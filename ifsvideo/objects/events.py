@@ -96,10 +96,9 @@ def events_of(sights: Sights, info: VideoInfo, frames: int) -> Iterator[Event]:
     borders = _borders(rows, info)
     near = max(1, round(_NEAR_S * fps))
     yield event(0, "appears", _appearing(sights, borders[:near], fps))
-    passed = _passing(sights, borders, info)
-    if passed is not None:
-        row, side = passed
-        yield event(row, "overtakes", f"overtakes on the {side}")
+    side = _passing(sights, borders, info)
+    if side is not None:
+        yield event(0, "overtakes", f"overtakes on the {side}")
     for row in _closing(rows, fps):
         yield event(row, "comes closer fast", f"comes closer fast: contact in {rows.ttc_s[row]:.1f} s")
     crossed = _crossing(rows, info)
@@ -140,11 +139,10 @@ def _place(side: str) -> str:
     return f"on the {side}" if side in ("left", "right") else f"at the {side}"
 
 
-def _passing(sights: Sights, borders: NDArray[np.bool_], info: VideoInfo) -> tuple[int, str] | None:
-    """Row in which it is ahead of us, whole, and the side on which it came past us; None if it did not."""
+def _passing(sights: Sights, borders: NDArray[np.bool_], info: VideoInfo) -> str | None:
+    """Side on which it came past us: in over the edge, and on ahead, our way; None if it did not."""
     rows, fps = sights.rows, float(info.fps)
-    start = max(1, round(_NEAR_S * fps))
-    touched = borders[:start, :2].any(axis=0)
+    touched = borders[: max(1, round(_NEAR_S * fps)), :2].any(axis=0)
     if rows.frame[0] <= _EDGE_S * fps or not touched.any():
         return None
     side = int(np.argmax(touched))
@@ -152,12 +150,11 @@ def _passing(sights: Sights, borders: NDArray[np.bool_], info: VideoInfo) -> tup
     gone = at_edge[np.diff(at_edge, append=len(rows)) > _EDGE_S * fps]
     if not len(gone):
         return None
-    whole = int(gone[0]) + 1
-    after = slice(0, whole + round(fps))
-    goes_our_way = _median(sights.foot[after]) < 0
-    recedes = _median(rows.scale_rate[after]) < -_RECEDES
-    moving = _median(sights.around[after]) * fps > _STILL * np.hypot(info.width, info.height)
-    return (whole, _SIDES[side]) if goes_our_way and recedes and moving else None
+    first = slice(0, int(gone[0]) + round(fps))
+    goes_our_way = _median(sights.foot[first]) < 0
+    recedes = _median(rows.scale_rate[first]) < -_RECEDES
+    moving = _median(sights.around[first]) * fps > _STILL * np.hypot(info.width, info.height)
+    return _SIDES[side] if goes_our_way and recedes and moving else None
 
 
 def _falls_behind(sights: Sights, side: str, fps: float) -> bool:
