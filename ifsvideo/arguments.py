@@ -126,6 +126,7 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
 def _add_products(parser: argparse.ArgumentParser) -> None:
     products = parser.add_argument_group("further outputs")
     for option, place, text in (
+        ("--report", "FILE", ".html: page with the video, a timeline and table of objects, and plots"),
         (
             "--objects",
             "FILE",

@@ -17,9 +17,10 @@ from ifsvideo.output.masks import MaskSink
 from ifsvideo.output.object_tables import write_mot, write_objects
 from ifsvideo.output.summary_json import summary_document, write_summary
 from ifsvideo.output.tracks_npz import TracksSink
+from ifsvideo.report import ReportSink, video_beside
 from ifsvideo.types import Image, Result, Scene, Sink, VideoInfo
 
-ENDINGS = {"objects": ".csv", "mot": ".txt", "summary": ".json", "tracks": ".npz"}
+ENDINGS = {"objects": ".csv", "mot": ".txt", "summary": ".json", "tracks": ".npz", "report": ".html"}
 """How the files end."""
 FOLDERS = {"masks": masks.OWN_FILES, "clips": event_clips.OWN_FILES}
 """Pattern of what an earlier run wrote into the folders."""
@@ -37,6 +38,7 @@ class Products:
     masks : folder of indexed PNGs, one a frame.
     tracks : NumPy archive (.npz) with every track, which `Pipeline` takes as input again.
     clips : folder of the seconds round each event, cut out of the video.
+    report : page with video, timeline, table of objects and plots (.html); a large video stands beside it.
     """
 
     objects: Path | None = None
@@ -45,6 +47,7 @@ class Products:
     masks: Path | None = None
     tracks: Path | None = None
     clips: Path | None = None
+    report: Path | None = None
 
     def named(self) -> Iterator[tuple[str, Path]]:
         """Name and place of what is to be written."""
@@ -68,7 +71,10 @@ class Products:
             If it cannot be written.
         """
         places = dict(taken)
-        for name, path in self.named():
+        wanted = list(self.named())
+        if self.report:
+            wanted.append(("report's video", video_beside(Path(self.report))))
+        for name, path in wanted:
             ending = ENDINGS.get(name)
             if ending is not None and path.suffix.lower() != ending:
                 raise UsageError(f"{path}: unknown ending {path.suffix!r}; the {name} go to a {ending} file")
@@ -109,7 +115,7 @@ class ProductsSink:
     """
 
     def __init__(self, products: Products, info: VideoInfo, source: Path | None, outputs: Outputs) -> None:
-        self.history = ObjectHistory(info)
+        self.history = ObjectHistory(info, thumbnails=products.report is not None)
         self._products = products
         self._source = source
         self._outputs = outputs
@@ -117,7 +123,11 @@ class ProductsSink:
         self._clip_of: dict[Event, str] = {}
         self._masks = MaskSink(products.masks, info, outputs) if products.masks else None
         tracks = TracksSink(products.tracks, info, outputs) if products.tracks else None
-        self._sinks: list[Sink] = [sink for sink in (self.history, self._masks, tracks) if sink is not None]
+        name = source.resolve().name if source else "Tracks"
+        page = products.report
+        self._report = ReportSink(page, name, info, self.history, outputs) if page else None
+        sinks = (self.history, self._masks, tracks, self._report)
+        self._sinks: list[Sink] = [sink for sink in sinks if sink is not None]
 
     @property
     def wants_image(self) -> bool:
@@ -152,6 +162,8 @@ class ProductsSink:
         places = tuple(path for _, path in self._products.named())
         if not places:
             return result
+        if self._report and self._report.beside:
+            places += (self._report.beside,)
         return replace(result, events=self.history.events, history=self.history.table, further=places)
 
     def summarise(self, result: Result, settings: Mapping[str, Any]) -> None:

@@ -27,6 +27,7 @@ _COPIED_SOUND = {
 }
 """Codecs that the container holds and common players play; other sound is encoded again, as AAC."""
 _ENCODER = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-threads", "2"]
+_ENCODER_FOR_PAGES = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "26", "-g", "15", "-threads", "2"]
 # One matrix for every size, and the tags that say so: players guess by the size where tags are missing.
 _COLOURS = (
     "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p,"
@@ -83,6 +84,8 @@ class VideoWriter:
         Group with which the file is placed; alone by default.
     transparent : bool
         Whether the frames are RGBA; .mov only.
+    for_page : bool
+        Whether it is small rather than fine, and can be entered at every half second or so.
 
     Attributes
     ----------
@@ -113,6 +116,7 @@ class VideoWriter:
         audio_from: Path | None = None,
         outputs: Outputs | None = None,
         transparent: bool = False,
+        for_page: bool = False,
     ) -> None:
         check_output(path, endings=[".mov"] if transparent else FORMATS)
         self.path = path
@@ -122,6 +126,7 @@ class VideoWriter:
         self._audio_from = audio_from
         self._group = outputs
         self._transparent = transparent
+        self._encoder = _ENCODER_FOR_PAGES if for_page else _ENCODER
         self._pad = (0, 0) if transparent else (info.height % 2, info.width % 2)
         if any(self._pad):
             width, height = info.width + self._pad[1], info.height + self._pad[0]
@@ -216,7 +221,7 @@ class VideoWriter:
         filters = f"setsar=sar={info.sample_aspect}:max=65535"
         encoder, pixels = ["-c:v", "qtrle", "-pix_fmt", "argb"], "rgba"
         if not self._transparent:
-            filters, encoder, pixels = f"{_COLOURS},{filters}", _ENCODER, "rgb24"
+            filters, encoder, pixels = f"{_COLOURS},{filters}", self._encoder, "rgb24"
         return [
             *(
                 "-loglevel",
