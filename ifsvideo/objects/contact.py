@@ -35,6 +35,9 @@ _ROUNDS = 6
 _STANDARD_ERRORS = 2.0
 """How many standard errors the growth must exceed; noise does so once in forty times."""
 
+_LONGEST_S = 20.0
+"""Longest time to contact that is told, seconds: nothing on a road keeps its speed for longer."""
+
 
 @lru_cache(maxsize=1024)
 def _pairs(points: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -110,7 +113,7 @@ def contact(stretches: Floats, fps: float) -> Contact:
     -------
     Contact
         ``confidence`` is 1 less the relative error of the time, two standard errors of the growth: 0.8 where
-        it is right within a fifth. There is no time where that is 0.
+        it is right within a fifth. There is no time where that is 0, nor one beyond 20 s.
     """
     stretches = np.asarray(stretches, np.float64)
     total, run = accumulate(stretches[:, :3])
@@ -126,7 +129,7 @@ def contact(stretches: Floats, fps: float) -> Contact:
     error = np.hypot(noise, lopsided / 2.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         confidence = np.where(rate > 0, 1.0 - _STANDARD_ERRORS * error / rate, 0.0)
-    grows = confidence > 0
+    grows = (confidence > 0) & (rate > 1.0 / _LONGEST_S)
     ttc = np.full(len(rate), np.nan)
     ttc[grows] = 1.0 / rate[grows]
     return Contact(rate, ttc, np.where(grows, confidence, 0.0))

@@ -33,7 +33,7 @@ class ObjectTable:
         Growth of its lengths in the picture, 1/s: 0.5 is half as long again per second; below 0 it shrinks.
     ttc_s : (N,) float32
         Time to contact, seconds: until it reaches the camera's plane if it goes on as it does. NaN unless it
-        grows beyond noise.
+        grows beyond noise, and above 20 s.
     ttc_confidence : (N,) float32
         How sure it is that it grows, 0 to 1; 0 where ``ttc_s`` is NaN.
     """
