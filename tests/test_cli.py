@@ -127,6 +127,7 @@ def test_where_things_are_written(arguments, output, labels):
         (["a.mp4", "--config", "none.toml"], "none.toml: cannot be read"),
         (["a.mp4", "-o", ""], "-o needs the name of a file"),
         (["a.mp4", "b.mp4", "-o", "c.mp4"], "name one file"),
+        (["a.mp4", "b.mp4", "--clips", "c"], "name one file"),
         (["a.mp4", "a.avi"], "a.ifs.csv: two inputs"),
     ],
 )

@@ -15,7 +15,20 @@ _EARLY_S = 1.0
 _CLOCK_S = 0.001
 """By how much clocks may round, seconds: copying looks for a key frame as much later, to find it and not the
 one before, encoding begins as much earlier, not to lose a frame."""
-_EXACTLY = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-threads", "2"]
+_EXACTLY = [
+    "-fps_mode",
+    "passthrough",
+    "-c:v",
+    "libx264",
+    "-preset",
+    "veryfast",
+    "-crf",
+    "20",
+    "-pix_fmt",
+    "yuv420p",
+    "-threads",
+    "2",
+]
 _SOUND = ["-c:a", "aac", "-b:a", "160k"]
 
 
@@ -63,7 +76,7 @@ class Cutter:
                 return copied
             copied.unlink(missing_ok=True)
         encoded = stem.with_name(f"{stem.name}.mp4")
-        complaints = self._run(start - _CLOCK_S, end, [*_EXACTLY, *_SOUND], encoded)
+        complaints = self._run(start - _CLOCK_S, end - _CLOCK_S, [*_EXACTLY, *_SOUND], encoded)
         if complaints:
             raise OutputError(f"{stem.parent}: a piece of {self._source} could not be cut ({complaints[-1]})")
         return encoded
