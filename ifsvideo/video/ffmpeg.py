@@ -102,6 +102,10 @@ class Ffmpeg:
         """The last lines that the child wrote to stderr; complete after `wait` or `stop`."""
         return list(self._lines)
 
+    def kill(self) -> None:
+        """Kill the child, whoever waits for it; it is reaped as its context is left."""
+        self._process.kill()
+
     def stop(self) -> None:
         """Kill the child if it still runs, reap it, close the pipes."""
         if self._process.poll() is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from ifsvideo.errors import IfsVideoError, InputError, UsageError
 from ifsvideo.types import Image, VideoInfo
 from ifsvideo.video import ffmpeg
+from ifsvideo.video.picture import Picture
 from ifsvideo.video.probe import VIDEO_STREAM, Probe, probe
 from ifsvideo.video.source import FrameSource, choose_stretch
 
@@ -20,6 +22,9 @@ _SEEK_FROM_S = 10.0
 """Start, seconds, from which on it pays to look for a key frame instead of decoding all before."""
 _SEEK_MARGIN_S = 3.0
 """How much earlier the key frame is looked for: files are ordered by time of decoding, ahead of showing."""
+_RGB = ",format=rgb24"
+_PLANES = ":out_color_matrix=bt601:out_range=tv,format=yuv420p"
+"""As `Picture` has them; nothing is computed where the file has them already."""
 _ORIGIN = re.compile(r"^(\[[^\]]*\] )+")  # "[h264 @ 0x5632632572c0] ", which differs from run to run
 
 
@@ -51,6 +56,7 @@ class VideoFile(FrameSource):
         self, path: Path, *, fps: Fraction | None = None, start: float = 0.0, end: float | None = None
     ) -> None:
         self.path = path
+        self._child: ffmpeg.Ffmpeg | None = None
         found = probe(path)
         self._timing = _timing(found, fps)
         rate, zero = self._timing.fps, self._timing.zero
@@ -67,11 +73,33 @@ class VideoFile(FrameSource):
 
     def frames(self) -> Generator[Image, None, None]:
         """See `FrameSource.frames`."""
+        info = self.info
+        yield from self._decode(_RGB, (info.height, info.width, 3))
+
+    def pictures(self) -> Generator[Picture, None, None]:
+        """See `FrameSource.pictures`."""
+        width, height = self.info.width, self.info.height
+        if width % 2 or height % 2:  # half a row of colours cannot be told from a whole one
+            yield from super().pictures()
+            return
+        planes = self._decode(_PLANES, (height * 3 // 2, width))
+        with closing(planes):
+            for pixels in planes:
+                yield Picture(pixels)
+
+    def stop(self) -> None:
+        """See `FrameSource.stop`."""
+        if self._child is not None:
+            self._child.kill()
+
+    def _decode(self, form: str, shape: tuple[int, ...]) -> Generator[Image, None, None]:
+        """Frames of the stretch as arrays of a shape, in one of the forms below."""
         first, stop = self._stretch.first, self._stretch.stop
         place = first if self._seeks else 0
-        with ffmpeg.Ffmpeg(self._arguments()) as child:
+        with ffmpeg.Ffmpeg(self._arguments(form)) as child:
+            self._child = child
             while stop is None or place < stop:
-                image = self._read(child)
+                image = _read(child, shape)
                 if image is None:
                     self._check_end(child, place)
                     break
@@ -85,9 +113,9 @@ class VideoFile(FrameSource):
     def _seeks(self) -> bool:
         return self._timing.exact_seek and self.info.start >= _SEEK_FROM_S
 
-    def _arguments(self) -> list[str]:
+    def _arguments(self, form: str = _RGB) -> list[str]:
         # The size is forced, and the filters are not made anew, for files that change their size on the way.
-        filters = [f"scale={self.info.width}:{self.info.height}", "format=rgb24"]
+        filters = [f"scale={self.info.width}:{self.info.height}{form}"]
         seek = []
         if not self._timing.constant:
             filters.insert(0, f"fps={self.info.fps}:start_time=0")
@@ -99,11 +127,6 @@ class VideoFile(FrameSource):
             *("-i", ffmpeg.file_url(self.path), "-map", VIDEO_STREAM),
             *("-vf", ",".join(filters), "-fps_mode", "passthrough", "-f", "rawvideo", "-"),
         ]
-
-    def _read(self, child: ffmpeg.Ffmpeg) -> Image | None:
-        image = np.empty((self.info.height, self.info.width, 3), dtype=np.uint8)
-        got = child.stdout.readinto(image.data.cast("B"))
-        return image if got == image.nbytes else None
 
     def _check_end(self, child: ffmpeg.Ffmpeg, place: int) -> None:
         """Tell an end of the file from a failure; ``place`` frames were decoded or passed over."""
@@ -129,6 +152,13 @@ class VideoFile(FrameSource):
         if not printed or self._seeks:  # a decoder that begins in the middle complains of what it missed
             return ()
         return (f"{self.path}: is damaged in places{reason}",)
+
+
+def _read(child: ffmpeg.Ffmpeg, shape: tuple[int, ...]) -> Image | None:
+    """The next frame of a raw video, None at its end."""
+    image = np.empty(shape, dtype=np.uint8)
+    got = child.stdout.readinto(image.data.cast("B"))
+    return image if got == image.nbytes else None
 
 
 @dataclass(frozen=True)

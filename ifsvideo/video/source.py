@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 from ifsvideo.errors import UsageError
 from ifsvideo.types import Image, VideoInfo
+from ifsvideo.video.picture import Picture
 
 
 class FrameSource(ABC):
@@ -41,6 +43,17 @@ class FrameSource(ABC):
         InputError
             If no frame can be read, or a picture of a folder cannot.
         """
+
+    def pictures(self) -> Generator[Picture, None, None]:
+        """The same frames in the form in which they need least memory."""
+        with closing(self.frames()) as frames:
+            for image in frames:
+                yield Picture(image)
+
+    def stop(self) -> None:
+        """Make a pass that waits for data in another thread end soon, by whatever error; by default it is
+        taken not to wait long."""
+        return
 
 
 @dataclass(frozen=True)
