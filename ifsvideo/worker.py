@@ -1,0 +1,175 @@
+"""Functions that are called in a thread, or a process, of their own.
+
+The process is not made by `multiprocessing`: its way of starting one that is safe beside threads imports the
+main module again, and a user's script that is not written for this would begin anew in the child.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, Generic, Self, TypeVar
+
+from ifsvideo.ahead import POLL_S
+from ifsvideo.errors import IfsVideoError
+
+_Argument = TypeVar("_Argument")
+_Value = TypeVar("_Value")
+_COMMAND = "from ifsvideo.worker import serve; serve()"
+
+
+def value_of(future: Future[_Value]) -> _Value:
+    """The value of a call, once it is there; signals are heeded meanwhile.
+
+    A signal that another thread happens to receive does not wake one that waits without end.
+    """
+    while not wait([future], POLL_S).done:
+        continue
+    return future.result()
+
+
+class Caller(Generic[_Argument, _Value]):
+    """Calls a function of one argument in a thread, one call after the other.
+
+    Leaving the context drops the calls that have not begun, and does not wait for the one that has: a thread
+    cannot be stopped, and must not keep the program from ending.
+
+    Parameters
+    ----------
+    function : callable
+    """
+
+    def __init__(self, function: Callable[[_Argument], _Value]) -> None:
+        self._function = function
+        self._calls: queue.SimpleQueue[tuple[_Argument, Future[_Value]] | None] = queue.SimpleQueue()
+        self._left = False
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def begin(self, argument: _Argument) -> Future[_Value]:
+        """Begin a call; its value, or what it raised, is there when the future is done."""
+        future: Future[_Value] = Future()
+        self._calls.put((argument, future))
+        return future
+
+    def _run(self) -> None:
+        while (call := self._calls.get()) is not None and not self._left:
+            argument, future = call
+            try:
+                future.set_result(self._function(argument))
+            except BaseException as error:
+                future.set_exception(error)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._left = True
+        self._calls.put(None)
+
+
+class Worker(Generic[_Argument, _Value]):
+    """Calls a function of one argument in a child process, which ends with the context or with its parent.
+
+    Parameters
+    ----------
+    function : callable
+        Function, argument and value are pickled.
+    purpose : str
+        What the child does, for messages.
+    """
+
+    def __init__(self, function: Callable[[_Argument], _Value], purpose: str) -> None:
+        self._purpose = purpose
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _COMMAND],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+            start_new_session=True,  # Ctrl-C in the terminal reaches the parent alone, which decides
+        )
+        with suppress(BrokenPipeError):  # the first call tells of it
+            self._send(function)
+
+    @property
+    def pid(self) -> int:
+        """Process id of the child."""
+        return self._process.pid
+
+    def __call__(self, argument: _Argument) -> _Value:
+        """Call the function; what it raises is raised here.
+
+        Raises
+        ------
+        IfsVideoError
+            If the child was killed.
+        """
+        assert self._process.stdout is not None
+        try:
+            self._send(argument)
+            done, value = pickle.load(self._process.stdout)
+        except (BrokenPipeError, EOFError, pickle.UnpicklingError):
+            raise self._ended() from None
+        if not done:
+            raise value
+        result: _Value = value
+        return result
+
+    def _send(self, thing: object) -> None:
+        assert self._process.stdin is not None
+        pickle.dump(thing, self._process.stdin, protocol=pickle.HIGHEST_PROTOCOL)
+        self._process.stdin.flush()
+
+    def _ended(self) -> IfsVideoError:
+        status = self._process.wait()
+        how = f"was killed (signal {-status})" if status < 0 else f"ended (status {status})"
+        return IfsVideoError(
+            f"the process that {self._purpose} {how}; run again, with more memory free if it lacks"
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            with suppress(BrokenPipeError):
+                pipe.close()
+
+
+def serve() -> None:
+    """The child: take a function, then call it for every argument until there are no more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    requests = sys.stdin.buffer
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what anyone prints must not get among the answers
+    import cv2  # only the child needs it here
+
+    cv2.setNumThreads(1)
+    with suppress(EOFError, BrokenPipeError):
+        function = pickle.load(requests)
+        while True:
+            answer = _answer(function, pickle.load(requests))
+            pickle.dump(answer, answers, protocol=pickle.HIGHEST_PROTOCOL)
+            answers.flush()
+
+
+def _answer(function: Callable[[Any], Any], argument: Any) -> tuple[bool, Any]:
+    try:
+        return True, function(argument)
+    except Exception as error:
+        return False, error
