@@ -74,7 +74,7 @@ def _run(arguments: Arguments, debug: bool) -> int:
 
 def _process(pipeline: Pipeline, job: Job, arguments: Arguments) -> None:
     begun = time.perf_counter()
-    with _Bars(arguments.quiet) as bars:
+    with _Bar(arguments.quiet) as bar:
         result = pipeline.run(
             job.source,
             job.output,
@@ -85,7 +85,8 @@ def _process(pipeline: Pipeline, job: Job, arguments: Arguments) -> None:
             ignore=arguments.ignore,
             motions=arguments.motions,
             products=job.products,
-            progress=bars.show,
+            keep_table=False,
+            progress=bar.show,
         )
     if not arguments.quiet:
         print(summary(str(job.source), result, time.perf_counter() - begun), flush=True)
@@ -105,39 +106,28 @@ def _report(error: Exception, debug: bool) -> int:
     return status
 
 
-class _Bars:
-    """A progress bar on stderr for each stage, one after the other."""
+class _Bar:
+    """A progress bar on stderr."""
 
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
-        self._stage = ""
         self._bar: tqdm[Any] | None = None
 
     def show(self, stage: str, done: int, total: int | None) -> None:
         """A `ifsvideo.types.Progress`."""
         if self._quiet:
             return
-        if self._bar is None or stage != self._stage:
-            self._close()
-            self._stage = stage
-            self._bar = self._new(stage, total)
+        if self._bar is None:
+            self._bar = tqdm(unit="frame", file=sys.stderr, dynamic_ncols=True)
         self._bar.total = total
         self._bar.update(done - self._bar.n)
 
-    def _new(self, stage: str, total: int | None) -> tqdm[Any]:
-        unit = "window" if stage == "segmenting" else "frame"
-        return tqdm(desc=stage, total=total, unit=unit, file=sys.stderr, dynamic_ncols=True)
-
-    def _close(self) -> None:
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
-
-    def __enter__(self) -> _Bars:
+    def __enter__(self) -> _Bar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._close()
+        if self._bar is not None:
+            self._bar.close()
 
 
 @contextmanager

@@ -145,9 +145,15 @@ class ObjectsConfig:
     like motion in one window seldom do so again in the next, which sees half of the same frames."""
     least_seconds: float = 0.5
     """What lives shorter is no object; its points go to the background."""
+    longest_loss_s: float = 1.0
+    """How long an object may be lost, behind a pole or a wiper, and still be the same, seconds: longer, and
+    another may have come in its place."""
+    longest_freeze_s: float = 1.0
+    """How long repeated frames are taken for no frames, seconds; what the camera did not send, or the change
+    of a rate put in, is shorter."""
     check_borders: bool = True
     """Whether tracks that move with an object are asked if their own pixels show it or the ground behind it
-    (`ifsvideo.objects.figure_ground`); costs one more reading of the video."""
+    (`ifsvideo.objects.figure_ground`)."""
     least_ground_misfit: float = 1.65
     """How many times worse than the object the ground must fit the pixels of a track called moving. Less, and
     corners outside an outline stay with the object; at 2.1, one in a hundred of those on it is lost for
@@ -158,6 +164,9 @@ class ObjectsConfig:
     """How far the world's common motion must have gone meanwhile, pixels."""
     fixed_travel: float = 10.0
     """How far the typical point of the world must have gone meanwhile, pixels, summed over frames."""
+    fixed_memory_s: float = 8.0
+    """How much of the past is looked at, seconds: on a smooth road it takes seconds until the camera has
+    shaken enough. Longer costs memory and tells no more of most tracks."""
     fixed_world_share: float = 0.3
     """Share of the picture's textured cells in which points must move; below it the camera stands still."""
 
@@ -169,13 +178,20 @@ class ObjectsConfig:
             "least_shared",
             "fixed_spread",
             "fixed_shake",
+            "fixed_memory_s",
         ):
             if not getattr(self, name) > 0:
                 raise UsageError(f"objects.{name} must be positive, got {getattr(self, name)}")
         for name in ("least_life", "fixed_world_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise UsageError(f"objects.{name} must be 0 to 1, got {getattr(self, name)}")
-        for name in ("least_seconds", "least_ground_misfit", "fixed_travel"):
+        for name in (
+            "least_seconds",
+            "least_ground_misfit",
+            "fixed_travel",
+            "longest_loss_s",
+            "longest_freeze_s",
+        ):
             if not getattr(self, name) >= 0:
                 raise UsageError(f"objects.{name} must not be negative, got {getattr(self, name)}")
 

@@ -1,27 +1,31 @@
-"""From a clip to labels and a coloured overlay: read, track, segment and link, check borders, write."""
+"""From a clip to labels and an overlay: read, track, segment, link, check borders, write; all at once.
+
+Three threads and a process, with queues of limited length between them: one thread reads and tracks, the
+process labels the windows (one more thread waits for it), and the caller's own thread links these, and draws
+and writes what is final. What comes out does not depend on who is faster.
+"""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
-from dataclasses import asdict, replace
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
-from typing import TypeVar
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.ahead import Ahead
 from ifsvideo.clip import Clip, Source, check_outputs, open_clip
 from ifsvideo.config import Config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, ignore_mask
-from ifsvideo.objects.figure_ground import FigureGround
-from ifsvideo.objects.labelling import label_clip
-from ifsvideo.objects.numbering import settle
+from ifsvideo.objects.labelling import label_frames
+from ifsvideo.objects.shot import Frame, WindowLabels
+from ifsvideo.objects.windows import WindowLabeller, WindowSize
 from ifsvideo.output.atomic import Outputs
+from ifsvideo.output.census import Census, TableSink
 from ifsvideo.output.labels import LabelSink
 from ifsvideo.output.overlay import OverlayRenderer
 from ifsvideo.output.overlay_video import OverlaySink, check_wishes
@@ -29,27 +33,18 @@ from ifsvideo.output.products import Products, ProductsSink
 from ifsvideo.output.scenes import Scenes
 from ifsvideo.output.styles import look_of
 from ifsvideo.segmentation.segmenter import IFSSegmenter
+from ifsvideo.stopwatch import Stopwatch
+from ifsvideo.tracking.steps import Step, follow, steps_of
 from ifsvideo.tracking.tracker import KltTracker
-from ifsvideo.tracking.trajectories import Trajectories
-from ifsvideo.types import (
-    BACKGROUND,
-    UNDECIDED,
-    Bools,
-    FramePoints,
-    Image,
-    LabelTable,
-    MovingObject,
-    Progress,
-    Renderer,
-    Result,
-    Segmenter,
-    Sink,
-    Tracker,
-    VideoInfo,
-)
-from ifsvideo.video import FrameSource
+from ifsvideo.types import Bools, Counts, Progress, Renderer, Result, Segmenter, Sink, Tracker, Tracks
+from ifsvideo.worker import Caller, Worker
 
-_Item = TypeVar("_Item")
+_AHEAD = 8
+"""Frames that may be tracked before those behind are labelled."""
+_STAGES = ("reading", "tracking", "segmenting", "linking", "writing")
+"""Stages whose seconds are told; they run side by side."""
+_WORTH_A_PROCESS = 3
+"""Windows from which on a process of its own pays: it takes as long to start as a window to label."""
 
 
 class Pipeline:
@@ -96,9 +91,10 @@ class Pipeline:
         motions: int | None = None,
         audio: bool = True,
         products: Products | None = None,
+        keep_table: bool = True,
         progress: Progress | None = None,
     ) -> Result:
-        """Run all stages over one clip; frames are never all held in memory.
+        """Run all stages over one clip, which is read once; frames are never all held in memory.
 
         Parameters
         ----------
@@ -119,8 +115,10 @@ class Pipeline:
             Whether the video keeps the sound.
         products : Products, optional
             Places of further outputs: objects, masks, tracks, clips, a summary.
+        keep_table : bool, optional
+            Whether the result holds every row of the labels; without, memory does not grow with the clip.
         progress : callable, optional
-            ``progress(stage, done, total)``, called after every step.
+            ``progress("frames", done, total)``, called as each frame is written.
 
         Returns
         -------
@@ -144,126 +142,104 @@ class Pipeline:
         if ignore and clip.frames is None:
             raise UsageError(f"{clip.name}: tracks hold no pictures; leave out ignore")
         mask = ignore_mask(ignore, clip.info)
-        log = _Log(progress)
+        watch = Stopwatch()
+        census, table = Census(), TableSink()
         with Outputs() as outputs:
-            trajectories = _ordered(clip.trajectories or self._track(clip.frames, mask, log))
-            found = self._label(trajectories, motions, log)
-            found = self._check_borders(clip.frames, trajectories, found, log)
-            table = LabelTable(
-                trajectories.frame, trajectories.ids, trajectories.xy, found, trajectories.frames
-            )
             further = ProductsSink(products, clip.info, clip.path, outputs)
-            sinks: list[Sink] = [further] if any(products.named()) else []
+            sinks: list[Sink] = [census]
+            sinks += [table] if keep_table else []
+            sinks += [further] if any(products.named()) else []
             if csv is not None:
                 sinks.append(LabelSink(csv, outputs))
             if video is not None:
                 sound = clip.path if audio and clip.info.has_audio else None
                 overlay = OverlaySink(video, clip.info, self.renderer, outputs, sound, self.config.overlay)
                 sinks.append(overlay)
-            self._feed(sinks, clip, table, log)
-            if video is not None:
-                log.warnings.extend(overlay.warnings)
-            log.warnings.extend(further.warnings)
-            log.warnings[:0] = [*(clip.frames.warnings if clip.frames else ()), *_remarks(table)]
-            objects = _objects(table, clip.info)
-            result = Result(clip.info, table, objects, video, csv, tuple(log.warnings), log.seconds)
+            with self._tracked(clip, mask, watch) as steps, self._segmenting(clip, motions, watch) as label:
+                size = (clip.info.width, clip.info.height)
+                frames = label_frames(steps, label, self.config.objects, size, float(clip.info.fps))
+                self._feed(sinks, clip, watch.each("linking", frames), watch, progress)
+            with watch.stage("writing"):
+                for sink in sinks:
+                    sink.finish()
+            warnings = [*(clip.frames.warnings if clip.frames else ()), *_remarks(census.counts)]
+            warnings += [*(overlay.warnings if video is not None else ()), *further.warnings]
+            kept = table.table if keep_table else None
+            result = Result(
+                clip.info,
+                census.counts,
+                census.objects,
+                video,
+                csv,
+                tuple(warnings),
+                watch.seconds_of(_STAGES),
+                kept=kept,
+            )
             result = further.described(result)
             told = {"motions": motions, "fps": fps, "start": start, "end": end, "ignore": list(ignore)}
             further.summarise(result, {**told, "config": asdict(self.config)})
         return result
 
-    def _track(self, source: FrameSource | None, mask: Bools | None, log: _Log) -> Trajectories:
-        assert source is not None, "a clip without trajectories has frames"
-        info = source.info
-        with log.stage("tracking"), closing(source.frames()) as frames:
-            counted = _Counted(frames)
-            steps = log.each("tracking", self.tracker.track(counted, mask), info.frames)
-            found = Trajectories.collect(steps, (info.width, info.height), float(info.fps))
-        if found.frames != counted.count:
-            raise ValueError(f"the tracker gave points for {found.frames} of {counted.count} frames")
-        return found
-
-    def _label(self, points: Trajectories, motions: int | None, log: _Log) -> NDArray[np.int32]:
-        """Label of every row of the trajectories."""
-        if not len(points.frame) or points.frames == 1:
-            return np.full(len(points.frame), UNDECIDED, dtype=np.int32)
-        with log.stage("segmenting"):
-            told = log.teller("segmenting")
-            return label_clip(points, self.segmenter, self.config.objects, motions, told)
-
-    def _check_borders(
-        self, source: FrameSource | None, points: Trajectories, labels: NDArray[np.int32], log: _Log
-    ) -> NDArray[np.int32]:
-        """The labels without what rides along outside an object's outline; as they are without pictures."""
-        config = self.config.objects
-        if source is None or not config.check_borders or not (labels > BACKGROUND).any():
-            return labels
-        check = FigureGround(points, labels)
-        with log.stage("checking borders"), closing(source.frames()) as frames:
-            for image in log.each("checking borders", frames, points.frames):
-                check.add(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False))
-            on_ground = check.on_ground(config.least_ground_misfit)
-        return settle(points, np.where(on_ground, BACKGROUND, labels).astype(np.int32), config)
-
-    def _feed(self, sinks: Sequence[Sink], clip: Clip, table: LabelTable, log: _Log) -> None:
-        """Give every frame to every sink."""
-        if not sinks:
+    @contextmanager
+    def _tracked(
+        self, clip: Clip, mask: Bools | None, watch: Stopwatch
+    ) -> Generator[Iterable[Step], None, None]:
+        """The steps of a clip, made in a thread of its own where there are pictures."""
+        if clip.frames is None:
+            assert clip.trajectories is not None, "a clip has frames or trajectories"
+            yield steps_of(clip.trajectories)
             return
-        scenes = Scenes(clip.info, look_of(self.config.overlay).trail_s)
-        wanted = clip.frames is not None and any(sink.wants_image for sink in sinks)
-        pictures = clip.frames.frames() if clip.frames and wanted else _none(table.frames)
-        with log.stage("writing"), closing(pictures):
-            for frame, image in enumerate(log.each("writing", pictures, table.frames)):
-                rows = table.at(frame)
-                scene = scenes.next(FramePoints(table.ids[rows], table.xy[rows]), table.labels[rows])
-                for sink in sinks:
-                    sink.add(scene, image)
-            for sink in sinks:
-                sink.finish()
-
-
-def _none(frames: int) -> Generator[None, None, None]:
-    """No picture, for every frame."""
-    for _ in range(frames):
-        yield None
-
-
-class _Log:
-    """What a run tells: progress while it runs, seconds and warnings when it is done."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self.progress: Progress = progress or (lambda stage, done, total: None)
-        self.seconds: dict[str, float] = {}
-        self.warnings: list[str] = []
+        pictures = watch.each("reading", clip.frames.pictures())
+        steps = watch.each("tracking", follow(self.tracker, pictures, mask))
+        with Ahead(steps, _AHEAD, clip.frames.stop) as ahead:
+            yield watch.each("waiting", ahead)
 
     @contextmanager
-    def stage(self, name: str) -> Generator[None, None, None]:
-        begun = time.perf_counter()
-        yield
-        self.seconds[name] = time.perf_counter() - begun
+    def _segmenting(
+        self, clip: Clip, motions: int | None, watch: Stopwatch
+    ) -> Generator[WindowLabels, None, None]:
+        """What labels windows: in a process of its own, or a thread where that would not pay.
 
-    def each(self, stage: str, items: Iterable[_Item], total: int | None) -> Iterator[_Item]:
-        self.progress(stage, 0, total)
-        for done, item in enumerate(items, 1):
-            yield item
-            self.progress(stage, done, total)
+        A segmenter of the user's own stays in this process too: it may keep state, and need not be picklable.
+        """
+        config = self.config.objects
+        labeller = WindowLabeller(self.segmenter, config, motions)
+        worth = _WORTH_A_PROCESS * WindowSize.at(float(clip.info.fps), config).length
+        long = clip.info.frames is None or clip.info.frames >= worth
+        with ExitStack() as stack:
+            call: Callable[[Tracks], NDArray[np.int64]] = labeller
+            if long and isinstance(self.segmenter, IFSSegmenter):
+                call = stack.enter_context(Worker(labeller, "segments"))
 
-    def teller(self, stage: str) -> Callable[[int, int], None]:
-        """A callback ``(done, total)`` for a part that does not know the name of its stage."""
-        return lambda done, total: self.progress(stage, done, total)
+            def label(tracks: Tracks) -> NDArray[np.int64]:
+                with watch.stage("segmenting"):
+                    return call(tracks)
 
+            yield stack.enter_context(Caller(label)).begin
 
-class _Counted:
-    """Frames, counted as they pass."""
-
-    def __init__(self, frames: Iterable[Image]) -> None:
-        self.count = 0
-        self._frames = frames
-
-    def __iter__(self) -> Iterator[Image]:
-        for frame in self._frames:
-            self.count += 1
-            yield frame
+    def _feed(
+        self,
+        sinks: Sequence[Sink],
+        clip: Clip,
+        frames: Iterable[Frame],
+        watch: Stopwatch,
+        progress: Progress | None,
+    ) -> None:
+        """Give every frame to every sink, as often as it is shown."""
+        tell: Progress = progress or (lambda stage, done, total: None)
+        scenes = Scenes(clip.info, look_of(self.config.overlay).trail_s)
+        wanted = any(sink.wants_image for sink in sinks)
+        done = 0
+        tell("frames", done, clip.info.frames)
+        for frame in frames:
+            for _ in range(frame.shown):
+                with watch.stage("writing"):
+                    image = frame.picture.rgb if wanted and frame.picture is not None else None
+                    scene = scenes.next(frame.points, frame.labels.astype(np.int32))
+                    for sink in sinks:
+                        sink.add(scene, image)
+                done += 1
+                tell("frames", done, clip.info.frames)
 
 
 def _exact(fps: Fraction | float | None) -> Fraction | None:
@@ -275,30 +251,10 @@ def _exact(fps: Fraction | float | None) -> Fraction | None:
     return Fraction(fps).limit_denominator(100_000)
 
 
-def _ordered(points: Trajectories) -> Trajectories:
-    """The same rows, by frame, then track."""
-    order = np.lexsort((points.ids, points.frame))
-    frame, ids = points.frame[order], points.ids[order]
-    twice = np.flatnonzero((np.diff(frame) == 0) & (np.diff(ids) == 0))
-    if len(twice):
-        raise ValueError(f"track {ids[twice[0]]} has two points in frame {frame[twice[0]]}")
-    return replace(points, frame=frame, ids=ids, xy=points.xy[order])
-
-
-def _remarks(table: LabelTable) -> list[str]:
+def _remarks(counts: Counts) -> list[str]:
     """What a user should know of the labels."""
-    if table.frames == 1:
+    if counts.frames == 1:
         return ["only one frame: nothing can be seen to move"]
-    if len(table.frame) == 0:
+    if counts.rows == 0:
         return ["no corner to track was found: the pictures show too little texture"]
     return []
-
-
-def _objects(table: LabelTable, info: VideoInfo) -> tuple[MovingObject, ...]:
-    """The moving objects of a table, by number."""
-    found = []
-    for label in np.unique(table.labels[table.labels > 0]).tolist():
-        rows = np.flatnonzero(table.labels == label)
-        first, last = (info.time_of(int(table.frame[row])) for row in rows[[0, -1]])
-        found.append(MovingObject(label, first, last, len(np.unique(table.ids[rows]))))
-    return tuple(found)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ifsvideo.output.legend import clock
 from ifsvideo.types import Result
 
@@ -40,7 +38,7 @@ def summary(name: str, result: Result, seconds: float) -> str:
 
 
 def _headline(name: str, result: Result) -> str:
-    frames = result.table.frames
+    frames = result.counts.frames
     length = f"{_count(frames, 'frame')}, {float(frames / result.info.fps):.1f} s"
     count = len(result.objects)
     moving = "nothing moves by itself" if not count else f"{_count(count, 'moving object')}"
@@ -49,18 +47,17 @@ def _headline(name: str, result: Result) -> str:
 
 def _points(result: Result) -> str:
     """Tracks in all, and how the rows divide."""
-    table = result.table
-    if len(table.labels) == 0:
+    counts = result.counts
+    if counts.rows == 0:
         return "none"
-    shares = [np.mean(part) for part in (table.labels == 0, table.labels > 0, table.labels < 0)]
-    words = ("background", "moving", "undecided")
-    parts = ", ".join(f"{100 * share:.1f} % {word}" for share, word in zip(shares, words, strict=True))
-    return f"{_count(len(np.unique(table.ids)), 'track')}; of all rows {parts}"
+    kinds = {"background": counts.background, "moving": counts.moving, "undecided": counts.undecided}
+    parts = ", ".join(f"{100 * number / counts.rows:.1f} % {kind}" for kind, number in kinds.items())
+    return f"{_count(counts.tracks, 'track')}; of all rows {parts}"
 
 
 def _speed(result: Result, seconds: float) -> str:
     stages = ", ".join(f"{stage} {spent:.1f} s" for stage, spent in result.seconds.items())
-    return f"{result.table.frames / max(seconds, 1e-9):.1f} frames per second ({stages})"
+    return f"{result.counts.frames / max(seconds, 1e-9):.1f} frames per second ({stages})"
 
 
 def _count(number: int, noun: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -280,19 +280,37 @@ class MovingObject:
 
 
 @dataclass(frozen=True)
+class Counts:
+    """How many frames and tracks a clip had, and how many rows of each kind its labels."""
+
+    frames: int
+    tracks: int
+    background: int
+    moving: int
+    undecided: int
+
+    @property
+    def rows(self) -> int:
+        """Rows in all."""
+        return self.background + self.moving + self.undecided
+
+
+@dataclass(frozen=True)
 class Result:
     """What a run found and wrote.
 
     Attributes
     ----------
     info : VideoInfo
-    table : LabelTable
+    counts : Counts
     objects : tuple of MovingObject, by number
     output, labels : Path or None
         What was written.
     warnings : tuple of str
         What a user should know: frames missing, a side padded, no corner found.
-    seconds : mapping of stage name to seconds spent.
+    seconds : mapping of stage name to seconds spent; stages run side by side.
+    kept : LabelTable or None
+        Every row, unless the run was told not to keep them; `table` is the same without None.
     events : tuple of Event, by time
     history : ObjectTable or None
         A row for every object and frame. This and the events are there where further outputs were asked for.
@@ -301,7 +319,7 @@ class Result:
     """
 
     info: VideoInfo
-    table: LabelTable
+    counts: Counts
     objects: tuple[MovingObject, ...]
     output: Path | None
     labels: Path | None
@@ -310,6 +328,20 @@ class Result:
     events: tuple[Event, ...] = ()
     history: ObjectTable | None = None
     further: tuple[Path, ...] = ()
+    kept: LabelTable | None = None
+
+    @property
+    def table(self) -> LabelTable:
+        """Every row of the labels.
+
+        Raises
+        ------
+        ValueError
+            If the run was told not to keep them (``keep_table=False``).
+        """
+        if self.kept is None:
+            raise ValueError("the run kept no table; leave out keep_table=False, or read the CSV")
+        return self.kept
 
 
 class Tracker(Protocol):
@@ -324,6 +356,15 @@ class Tracker(Protocol):
         ignore : (H, W) bool, optional
             True where the picture is not looked at.
         """
+        ...
+
+
+@runtime_checkable
+class GreyTracker(Protocol):
+    """A `Tracker` that can do without colours; it is then spared making them."""
+
+    def track_grey(self, frames: Iterable[Image], ignore: Bools | None = None) -> Iterator[FramePoints]:
+        """As `Tracker.track`, of frames (H, W) uint8."""
         ...
 
 

@@ -22,7 +22,7 @@ from ifsvideo.benchmark import datasets, metrics, options, runner, samples, tabl
 from ifsvideo.config import Config
 from ifsvideo.errors import IfsVideoError, InputError, OutputError, UsageError
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.types import LabelTable, Result, Segmentation, Tracks, VideoInfo
+from ifsvideo.types import Counts, LabelTable, Result, Segmentation, Tracks, VideoInfo
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "datasets"
 CONTRACT = {"dataset", "runs", "error", "median", "exact_count", "seconds", "sequences"}
@@ -70,7 +70,9 @@ class FakePipeline:
 
     def run(self, source: Path) -> Result:
         info = VideoInfo(8, 6, Fraction(2))
-        return Result(info, label_table([1, 2 if self.seed else 0]), (), None, None, (), {})
+        return Result(
+            info, Counts(0, 0, 0, 0, 0), (), None, None, (), {}, kept=label_table([1, 2 if self.seed else 0])
+        )
 
 
 def made_points(still: int = 12, moving: int = 8, frames: int = 6) -> np.ndarray:

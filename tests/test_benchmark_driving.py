@@ -17,7 +17,7 @@ from ifsvideo.benchmark import datasets, driving, side_by_side
 from ifsvideo.benchmark.comparison import Method, Trial
 from ifsvideo.benchmark.datasets import LabelledSequence
 from ifsvideo.errors import InputError
-from ifsvideo.types import LabelTable, Result, Segmentation, Tracks, VideoInfo
+from ifsvideo.types import Counts, LabelTable, Result, Segmentation, Tracks, VideoInfo
 from ifsvideo.video import open_source
 from tests.conftest import decoded, texture
 
@@ -77,7 +77,9 @@ class Half:
     def run(self, source: Path, *, start: float = 0.0, end: float | None = None) -> Result:
         assert source.name == "clip"
         rows = table([(20, 30, self.seed % 2), (60, 30, 1)])
-        return Result(VideoInfo(*SIZE, Fraction(10)), rows, (), None, None, (), {})
+        return Result(
+            VideoInfo(*SIZE, Fraction(10)), Counts(0, 0, 0, 0, 0), (), None, None, (), {}, kept=rows
+        )
 
 
 class AllMove:

@@ -14,7 +14,7 @@ from ifsvideo.benchmark import __main__ as command
 from ifsvideo.benchmark import marked, marking
 from ifsvideo.benchmark.marking import FrameMarks, Marks, Passing
 from ifsvideo.errors import InputError
-from ifsvideo.types import LabelTable, Result, VideoInfo
+from ifsvideo.types import Counts, LabelTable, Result, VideoInfo
 from ifsvideo.video import open_source
 
 MARKED = ("davis_car_shadow", "static_pedestrians")
@@ -130,7 +130,9 @@ class Perfect:
     def run(self, source: Path, *, start: float = 0.0, end: float | None = None) -> Result:
         assert source.name == "frames"
         table = rows([(20, 15, 1), (3, 15, self.seed % 2), (2, 3, self.seed % 2)])
-        return Result(VideoInfo(40, 30, Fraction(10)), table, (), None, None, (), {})
+        return Result(
+            VideoInfo(40, 30, Fraction(10)), Counts(0, 0, 0, 0, 0), (), None, None, (), {}, kept=table
+        )
 
 
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

@@ -11,7 +11,7 @@ import pytest
 
 from ifsvideo.benchmark import __main__ as command
 from ifsvideo.benchmark import static
-from ifsvideo.types import LabelTable, Result, VideoInfo
+from ifsvideo.types import Counts, LabelTable, Result, VideoInfo
 
 CONTRACT = {"name", "moving_percent", "undecided_percent", "objects", "longest_s"}
 
@@ -26,7 +26,7 @@ def result(labels: np.ndarray, fps: int = 4) -> Result:
         labels.ravel().astype(np.int32),
         frames,
     )
-    return Result(VideoInfo(8, 6, Fraction(fps)), rows, (), None, None, (), {})
+    return Result(VideoInfo(8, 6, Fraction(fps)), Counts(0, 0, 0, 0, 0), (), None, None, (), {}, kept=rows)
 
 
 class Stretched:

@@ -33,8 +33,9 @@ def test_first_command_writes_the_overlay_and_the_csv_beside_it(command, clip, t
     assert "24 frames, 1.2 s" in done.stdout
     for word in ("out.mp4", "out.csv", "frames per second", "points"):
         assert word in done.stdout
-    for stage in ("tracking", "segmenting", "writing"):
-        assert stage in done.stderr
+    for stage in ("reading", "tracking", "segmenting", "writing"):
+        assert stage in done.stdout
+    assert "24/24" in done.stderr
     assert re.search(r"24/24 \[\d\d:\d\d<\d\d:\d\d", done.stderr), "a bar tells the time left"
 
 

@@ -16,6 +16,7 @@ from ifsvideo.pipeline import Pipeline
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import FramePoints, Segmentation, Tracks, VideoInfo
 from ifsvideo.video import FrameSource
+from ifsvideo.video.picture import Picture
 
 WIDTH, HEIGHT, FRAMES, SIDE = 320, 240, 30, 60
 LEFT, TOP = 60, 90
@@ -52,13 +53,14 @@ class Clip:
 
     def sent_home(self) -> set[int]:
         """Tracks that the check takes from the object, in all their rows."""
-        check = FigureGround(self.points, self.labels())
-        for grey in self.greys:
-            check.add(grey)
-        rows = check.on_ground(RATIO)
-        ids = set(self.points.ids[rows].tolist())
-        assert rows.sum() == np.isin(self.points.ids, list(ids)).sum()
-        return ids
+        check = FigureGround()
+        labels = np.where(np.isin(self.points.ids, self.ground), 0, 1)
+        for frame, grey in enumerate(self.greys):
+            rows = self.points.frame == frame
+            order = np.argsort(self.points.ids[rows])
+            seen = FramePoints(self.points.ids[rows][order], self.points.xy[rows][order])
+            check.add(Picture(np.dstack([grey] * 3)), seen, labels[rows][order])
+        return set(check.on_ground(RATIO).tolist())
 
 
 def sliding_square(*, step: int = STEP, contrast: float = 40.0, scale: int = 1) -> Clip:
@@ -194,44 +196,39 @@ class Given:
 def run(label_of_kind: tuple[int, int, int], config: ObjectsConfig | None = None):
     clip = sliding_square()
     given = Given(clip, label_of_kind)
-    stages = []
     pipeline = Pipeline(Config(objects=config or ObjectsConfig()), tracker=given, segmenter=given)
-    result = pipeline.run(Pictures(clip), progress=lambda *step: stages.append(step))
-    checked = [step[1:] for step in stages if step[0] == "checking borders"]
-    labels = [result.table.labels[result.table.ids // 1000 == kind] for kind in range(3)]
-    return result, labels, checked
+    result = pipeline.run(Pictures(clip))
+    return result, [result.table.labels[result.table.ids // 1000 == kind] for kind in range(3)]
 
 
-def test_the_pipeline_checks_borders_as_a_stage_of_its_own() -> None:
-    result, (ground, on_object, outside), checked = run((0, 1, 1))
+def test_the_pipeline_sends_home_what_only_rides_along() -> None:
+    _, (ground, on_object, outside) = run((0, 1, 1))
     assert not ground.any()
     assert (on_object == 1).all()
     assert not outside.any()
-    assert checked == [(done, FRAMES) for done in range(FRAMES + 1)]
-    assert "checking borders" in result.seconds
 
 
 def test_an_object_that_was_nothing_but_border_leaves_no_gap() -> None:
-    before, (_, on_object, outside), _ = run((0, 2, 1), ObjectsConfig(check_borders=False))
+    before, (_, on_object, outside) = run((0, 2, 1), ObjectsConfig(check_borders=False))
     assert [item.label for item in before.objects] == [1, 2]
     assert (outside == 1).all()
     assert (on_object == 2).all()
-    result, (_, on_object, outside), _ = run((0, 2, 1))
+    result, (_, on_object, outside) = run((0, 2, 1))
     assert [item.label for item in result.objects] == [1]
     assert (on_object == 1).all()
     assert not outside.any()
 
 
-@pytest.mark.parametrize(
-    ("label_of_kind", "config"),
-    [((0, 1, 1), ObjectsConfig(check_borders=False)), ((0, 0, 0), ObjectsConfig())],
-)
-def test_the_check_is_left_out_where_it_is_not_wanted_or_nothing_moves(label_of_kind, config) -> None:
-    result, (_, on_object, outside), checked = run(label_of_kind, config)
-    assert (on_object == label_of_kind[1]).all()
-    assert (outside == label_of_kind[2]).all()
-    assert not checked
-    assert "checking borders" not in result.seconds
+def test_the_check_is_left_out_where_it_is_not_wanted() -> None:
+    _, (_, on_object, outside) = run((0, 1, 1), ObjectsConfig(check_borders=False))
+    assert (on_object == 1).all()
+    assert (outside == 1).all()
+
+
+def test_where_nothing_moves_no_picture_is_looked_at(monkeypatch) -> None:
+    monkeypatch.setattr(Picture, "grey", property(lambda self: pytest.fail("a picture was looked at")))
+    _, (_, on_object, _) = run((0, 0, 0))
+    assert not on_object.any()
 
 
 def test_tracks_without_pictures_are_not_checked() -> None:
@@ -239,4 +236,3 @@ def test_tracks_without_pictures_are_not_checked() -> None:
     tracks = clip.points.window(0, FRAMES)
     result = Pipeline(segmenter=Given(clip, (0, 1, 1))).run(tracks)
     assert (result.table.labels[result.table.ids >= 1000] == 1).all()
-    assert "checking borders" not in result.seconds

@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 
 from ifsvideo.objects.linking import Linker
+from ifsvideo.types import Tracks
+
+
+def window(ids: np.ndarray) -> Tracks:
+    """Tracks that stand still, each at its own place."""
+    return Tracks.from_array(np.tile(np.stack([ids, ids], axis=1), (4, 1, 1)), ids=ids)
 
 
 def link(linker: Linker, labels: dict[range, int]) -> dict[range, set[int]]:
     """Link one window given as label of each range of ids; the numbers of each range."""
     ids = np.array([i for block in labels for i in block], dtype=np.int64)
     own = np.array([label for block, label in labels.items() for _ in block], dtype=np.int64)
-    linked = linker.link(ids, own, np.stack([ids, ids], axis=1))
+    linked = linker.link(window(ids), own)
     number = dict(zip(ids.tolist(), linked.tolist(), strict=True))
     return {block: {number[i] for i in block} for block in labels}
 
@@ -67,7 +73,7 @@ def test_most_tracks_in_all_keep_their_number() -> None:
     # The first label shares 5 with 1 and 4 with 2, the second 4 with 1 and none with 2.
     one = [*range(5), *range(9, 13)]
     ids = np.array([*one, 5, 6, 7, 8], dtype=np.int64)
-    found = linker.link(ids, np.repeat([1, 2], [9, 4]), np.stack([ids, ids], axis=1))
+    found = linker.link(window(ids), np.repeat([1, 2], [9, 4]))
     assert found.tolist() == [2] * 9 + [1] * 4
 
 
@@ -118,7 +124,7 @@ def test_an_empty_window(before: bool) -> None:
     linker = Linker(3)
     if before:
         link(linker, {A: 1})
-    assert linker.link(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2))).shape == (0,)
+    assert linker.link(window(np.empty(0, np.int64)), np.empty(0, np.int64)).shape == (0,)
 
 
 def test_objects_known_apart_are_not_made_one_by_a_window_that_mixes_them() -> None:

@@ -2,36 +2,43 @@
 
 from __future__ import annotations
 
+from itertools import count
+
 import numpy as np
 import pytest
 
-from ifsvideo.config import ObjectsConfig
-from ifsvideo.objects.numbering import settle
-from ifsvideo.tracking.trajectories import Trajectories
+from ifsvideo.objects.numbering import Numbers
 
 
-def trajectories(frames: list[int], fps: float | None = 10.0) -> Trajectories:
-    rows = len(frames)
-    ids = np.arange(rows, dtype=np.int64)
-    return Trajectories(np.array(frames, np.int32), ids, np.zeros((rows, 2), np.float32), 20, (64, 48), fps)
+def settled(numbers: Numbers, labels: list[list[int]], final: int, start: int = 0) -> list[list[int]]:
+    arrays = [np.array(own, np.int64) for own in labels]
+    return [own.tolist() for own in numbers.settle(arrays, range(start, start + len(labels)), final)]
 
 
 def test_numbers_follow_the_first_sight() -> None:
-    points = trajectories([0, 0, 1, 2, 9, 9, 9])
-    labels = np.array([-1, 0, 7, 3, 3, 7, 0], np.int32)
-    settled = settle(points, labels, ObjectsConfig())
-    assert settled.tolist() == [-1, 0, 1, 2, 2, 1, 0]
-    assert settled.dtype == np.int32
+    labels = [[-1, 0, 7, 9], [3, 7], [3, 7], [9, 0]]
+    assert settled(Numbers(count(1), 2), labels, 4) == [[-1, 0, 1, 2], [3, 1], [3, 1], [2, 0]]
 
 
-@pytest.mark.parametrize(("fps", "number"), [(10.0, 1), (11.0, 0), (None, 0)])
-def test_what_lives_too_short_is_background(fps: float | None, number: int) -> None:
-    """Five frames are half a second at 10 a second, and less at more; untold, the rate is 30."""
-    labels = np.array([4, 4, -1], np.int32)
-    settled = settle(trajectories([3, 7, 8], fps), labels, ObjectsConfig(least_seconds=0.5))
-    assert settled.tolist() == [number, number, -1]
+@pytest.mark.parametrize(("least", "number"), [(5.0, 1), (5.5, 0)])
+def test_what_lives_too_short_is_background(least: float, number: int) -> None:
+    labels = [[4], [-1], [0], [0], [4]]
+    assert settled(Numbers(count(1), least), labels, 5) == [[number], [-1], [0], [0], [number]]
+
+
+def test_what_comes_later_counts_but_is_not_numbered_yet() -> None:
+    numbers = Numbers(count(1), 3)
+    assert settled(numbers, [[5], [5, 8], [5, 8], [8]], 1) == [[1]]
+    # Known by now, the first object keeps its number, however little of it is to come.
+    assert settled(numbers, [[5, 8], [8], [8], [6], [6], [6]], 4, start=1) == [[1, 2], [2], [2], [3]]
+
+
+def test_parts_of_a_clip_share_the_numbers() -> None:
+    following = count(1)
+    assert settled(Numbers(following, 1), [[4]], 1) == [[1]]
+    assert settled(Numbers(following, 1), [[4]], 1) == [[2]]
 
 
 def test_nothing_to_number() -> None:
-    assert settle(trajectories([]), np.empty(0, np.int32), ObjectsConfig()).shape == (0,)
-    assert settle(trajectories([0, 1]), np.array([0, -1], np.int32), ObjectsConfig()).tolist() == [0, -1]
+    assert settled(Numbers(count(1), 1), [], 0) == []
+    assert settled(Numbers(count(1), 1), [[], [0, -1]], 2) == [[], [0, -1]]

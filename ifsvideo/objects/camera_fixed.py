@@ -2,109 +2,166 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.tracking.trajectories import Trajectories
-from ifsvideo.types import Bools
+from ifsvideo.types import Bools, FramePoints
 
 _SHAKE_TO_SPREAD = 6.0
 """How many times the track's own spread the world must have shaken meanwhile."""
 _GRID = 8
 """Cells along a side of the picture; the world must be seen in many of them."""
+_LOOKED_AT = 80
+"""Frames of the memory in which tracks are looked at; more of them tell no more."""
+_LEAST_MEMORY = 128
+"""Fewest frames of it: more than come between two updates."""
+_LEAST_LOOKS = 3
+"""Frames in which a track must have been looked at."""
 
 
-def camera_fixed_tracks(trajectories: Trajectories, config: ObjectsConfig) -> NDArray[np.int64]:
-    """Ids of the tracks that stay put while the world is seen both to move and to shake.
+class CameraFixed:
+    """Finds the tracks that stay put while the world is seen both to move and to shake.
 
     A distant point straight ahead stays put too while the camera drives at it, but not when the camera
     pitches and yaws: so a track counts as fixed only if the common motion of all other points, summed over
     its life, left the place by several times what the track itself did. Where most of the picture stays put,
     the camera stands still and nothing is fixed to it.
 
-    Returns
-    -------
-    (T,) int64, ordered
+    Of the past as much is kept as ``config.fixed_memory_s`` says. Once fixed, a track stays so.
+
+    Parameters
+    ----------
+    size : (width, height) of the picture, pixels, or None where nobody told.
+    fps : float or None
+    config : ObjectsConfig
     """
-    if not len(trajectories.ids):
-        return np.empty(0, np.int64)
-    order = np.lexsort((trajectories.frame, trajectories.ids))
-    ids, frame, xy = (
-        trajectories.ids[order],
-        trajectories.frame[order],
-        trajectories.xy[order].astype(np.float64),
-    )
-    names, first, count = np.unique(ids, return_index=True, return_counts=True)
-    column = np.repeat(np.arange(len(names)), count)
-    unit = _unit(trajectories)
-    spread, gone = _spread_and_displacement(xy, first, count)
-    still = (spread < config.fixed_spread * unit) & (count >= 3)
-    moving = ~still & (gone > 4 * config.fixed_spread * unit)
-    common, moves = _common_motion(frame, ids, xy, still[column], moving[column], trajectories, config)
-    path = np.vstack([np.zeros((1, 2)), np.cumsum(common, axis=0)])
-    travelled = np.concatenate([[0.0], np.cumsum(moves)])
-    fixed = []
-    for k in np.flatnonzero(still):
-        begin, end = frame[first[k]], frame[first[k] + count[k] - 1]
-        shake = np.linalg.norm(np.ptp(path[begin : end + 1], axis=0))
-        enough = max(config.fixed_shake * unit, _SHAKE_TO_SPREAD * spread[k])
-        if shake > enough and travelled[end] - travelled[begin] > config.fixed_travel * unit:
-            fixed.append(names[k])
-    return np.array(fixed, dtype=np.int64)
+
+    def __init__(self, size: tuple[int, int] | None, fps: float | None, config: ObjectsConfig) -> None:
+        memory = max(_LEAST_MEMORY, round(config.fixed_memory_s * (fps or 30.0)))
+        self._size = size
+        self._config = config
+        self._every = math.ceil(memory / _LOOKED_AT)
+        self._frames: deque[FramePoints] = deque(maxlen=memory)
+        self._common: deque[NDArray[np.float64]] = deque(maxlen=memory)
+        self._lengths: deque[float] = deque(maxlen=memory)
+        self._new = 0
+        self.ids = np.empty(0, np.int64)
+        """(T,) int64, ordered: the tracks known to be fixed, as of the last `update`."""
+
+    def add(self, points: FramePoints) -> None:
+        """Take the points of the next frame, ordered by id."""
+        self._frames.append(points)
+        self._new += 1
+
+    def forget(self, alive: NDArray[np.int64]) -> None:
+        """Drop what is known of all other tracks: they will not come again."""
+        self.ids = np.intersect1d(self.ids, alive)
+
+    def update(self) -> None:
+        """Look at the tracks seen since the last update."""
+        recent = list(self._frames)[-self._new :]
+        if not recent:
+            return
+        ids = np.unique(np.concatenate([frame.ids for frame in recent]))
+        looks = list(self._frames)[:: self._every]
+        xy = np.asarray(np.stack([_positions(ids, frame) for frame in looks]), np.float32)
+        count = np.isfinite(xy[:, :, 0]).sum(axis=0)
+        unit = self._unit(recent)
+        bound = self._config.fixed_spread * unit
+        first, last = _ends(xy)
+        gone = np.linalg.norm(last - first, axis=1)
+        spread = np.full(len(ids), np.inf)
+        near = np.flatnonzero((gone <= 4 * bound) & (count >= _LEAST_LOOKS))
+        spread[near] = _spread(xy[:, near], count[near])
+        still, moving = spread < bound, (spread >= bound) & (gone > 4 * bound)
+        self._follow_world(ids[still], ids[moving])
+        self._judge(ids[still], spread[still], xy[:, still], unit)
+
+    def _judge(
+        self,
+        ids: NDArray[np.int64],
+        spread: NDArray[np.float64],
+        xy: NDArray[np.float32],
+        unit: float,
+    ) -> None:
+        """Which of the tracks that stay put are fixed."""
+        config = self._config
+        path = np.cumsum(np.vstack([np.zeros((1, 2)), *self._common]), axis=0)
+        travelled = np.concatenate([[0.0], np.cumsum(self._lengths)])
+        # Frame f of the memory is path[f]: as many steps as frames were kept before the first of all came.
+        path, travelled = path[-len(self._frames) :], travelled[-len(self._frames) :]
+        if not len(ids) or travelled[-1] - travelled[0] <= config.fixed_travel * unit:
+            return
+        seen = np.isfinite(xy[:, :, 0])
+        begin = np.argmax(seen, axis=0) * self._every
+        end = (len(seen) - 1 - np.argmax(seen[::-1], axis=0)) * self._every
+        found = []
+        for k in np.flatnonzero(~np.isin(ids, self.ids)):
+            shake = np.linalg.norm(np.ptp(path[begin[k] : end[k] + 1], axis=0))
+            enough = max(config.fixed_shake * unit, _SHAKE_TO_SPREAD * spread[k])
+            if shake > enough and travelled[end[k]] - travelled[begin[k]] > config.fixed_travel * unit:
+                found.append(ids[k])
+        self.ids = np.union1d(self.ids, np.array(found, np.int64))
+
+    def _follow_world(self, still: NDArray[np.int64], moving: NDArray[np.int64]) -> None:
+        """Median step of the moving points, and median length of their steps, for every new frame.
+
+        Both are zero in frames in which such points own a small part of the picture only: they are movers
+        then, before a camera that stands still.
+        """
+        frames = list(self._frames)[-self._new - 1 :]
+        self._new = 0
+        for before, after in pairwise(frames):
+            there = _positions(before.ids, after)
+            goes = np.isin(before.ids, moving)
+            counted = np.isfinite(there[:, 0]) & (goes | np.isin(before.ids, still))
+            step, goes, xy = (there - before.xy)[counted], goes[counted], before.xy[counted]
+            if goes.any() and self._share_owned(xy, goes) >= self._config.fixed_world_share:
+                self._common.append(np.median(step[goes], axis=0).astype(np.float64))
+                self._lengths.append(float(np.median(np.linalg.norm(step[goes], axis=1))))
+            else:
+                self._common.append(np.zeros(2))
+                self._lengths.append(0.0)
+
+    def _share_owned(self, xy: NDArray[np.float32], goes: Bools) -> float:
+        """Share of the cells with points in which most of them go."""
+        extent = np.asarray(self._size or np.ptp(xy, axis=0).tolist(), dtype=np.float64) + 1
+        cell = np.clip((xy / extent * _GRID).astype(int), 0, _GRID - 1) @ [1, _GRID]
+        seen = np.bincount(cell, minlength=_GRID**2)
+        going = np.bincount(cell[goes], minlength=_GRID**2)
+        return int(np.count_nonzero(2 * going > seen)) / max(int(np.count_nonzero(seen)), 1)
+
+    def _unit(self, recent: list[FramePoints]) -> float:
+        """Pixels per pixel of a 640x480 picture."""
+        if self._size:
+            return float(max(np.hypot(*self._size), 1.0)) / 800
+        xy = np.concatenate([frame.xy for frame in recent])
+        return float(max(np.hypot(*np.ptp(xy, axis=0)), 1.0)) / 800 if len(xy) else 1.0
 
 
-def _unit(trajectories: Trajectories) -> float:
-    """Pixels per pixel of a 640x480 picture."""
-    size = trajectories.size
-    extent = np.hypot(*size) if size else np.hypot(*np.ptp(trajectories.xy, axis=0))
-    return float(max(extent, 1.0)) / 800
+def _positions(ids: NDArray[np.int64], frame: FramePoints) -> NDArray[np.float32]:
+    """Where tracks were in a frame, (N, 2); NaN where they were not seen."""
+    found = np.full((len(ids), 2), np.nan, np.float32)
+    _, here, there = np.intersect1d(ids, frame.ids, assume_unique=True, return_indices=True)
+    found[here] = frame.xy[there]
+    return found
 
 
-def _spread_and_displacement(
-    xy: NDArray[np.float64], first: NDArray[np.int64], count: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Radius round a track's median position that holds nine tenths of its life, and distance from first to
-    last."""
-    spread = np.empty(len(first))
-    gone = np.empty(len(first))
-    for k, (begin, n) in enumerate(zip(first, count, strict=True)):
-        own = xy[begin : begin + n]
-        distance = np.linalg.norm(own - np.median(own, axis=0), axis=1)
-        spread[k] = np.quantile(distance, 0.9)
-        gone[k] = np.linalg.norm(own[-1] - own[0])
-    return spread, gone
+def _ends(xy: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """First and last position (N, 2) of each track of (L, N, 2); NaN where there is none."""
+    seen = np.isfinite(xy[:, :, 0])
+    column = np.arange(xy.shape[1])
+    return xy[np.argmax(seen, axis=0), column], xy[len(xy) - 1 - np.argmax(seen[::-1], axis=0), column]
 
 
-def _common_motion(
-    frame: NDArray[np.int32],
-    ids: NDArray[np.int64],
-    xy: NDArray[np.float64],
-    still: Bools,
-    moving: Bools,
-    trajectories: Trajectories,
-    config: ObjectsConfig,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Median step of the moving points (F-1, 2), and median length of their steps (F-1,), frame by frame.
-
-    Both are zero in frames in which such points own a small part of the picture only: they are movers then,
-    before a camera that stands still.
-    """
-    rows = np.flatnonzero((np.diff(ids) == 0) & (np.diff(frame) == 1) & (still | moving)[:-1])
-    rows = rows[np.argsort(frame[rows], kind="stable")]
-    step = xy[rows + 1] - xy[rows]
-    extent = np.asarray(trajectories.size or np.ptp(xy, axis=0).tolist(), dtype=np.float64) + 1
-    cell = np.clip((xy[rows] / extent * _GRID).astype(int), 0, _GRID - 1) @ [1, _GRID]
-    steps = max(trajectories.frames - 1, 0)
-    common, length = np.zeros((steps, 2)), np.zeros(steps)
-    bounds = np.searchsorted(frame[rows], np.arange(steps + 1))
-    for f in range(steps):
-        here = slice(bounds[f], bounds[f + 1])
-        goes = moving[rows[here]]
-        seen = np.bincount(cell[here], minlength=_GRID**2)
-        going = np.bincount(cell[here][goes], minlength=_GRID**2)
-        owned = np.count_nonzero(2 * going > seen) / max(int(np.count_nonzero(seen)), 1)
-        if goes.any() and owned >= config.fixed_world_share:
-            common[f] = np.median(step[here][goes], axis=0)
-            length[f] = np.median(np.linalg.norm(step[here][goes], axis=1))
-    return common, length
+def _spread(xy: NDArray[np.float32], count: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Radius (N,) round each track's median position that holds nine tenths of (L, N, 2), NaN left out."""
+    column = np.arange(xy.shape[1])
+    middle = np.sort(xy, axis=0)[(count - 1) // 2, column]  # sorting puts NaN last
+    distance = np.sort(np.linalg.norm(xy - middle, axis=2), axis=0)
+    return np.asarray(distance[np.ceil(0.9 * (count - 1)).astype(int), column], np.float64)

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -21,8 +23,8 @@ from scipy.spatial import cKDTree
 
 from ifsvideo.tracking.appearance import grid
 from ifsvideo.tracking.tracker import LARGEST
-from ifsvideo.tracking.trajectories import Trajectories
-from ifsvideo.types import BACKGROUND, Bools, Image
+from ifsvideo.types import BACKGROUND, FramePoints, Image, Ints
+from ifsvideo.video.picture import Picture
 
 _LAGS = (2, 4, 6)
 """Frames between the pictures that are compared: few enough that neither object nor ground changes its looks,
@@ -48,95 +50,123 @@ _NOISE = 1.0
 both, so that two small ones count as nearly equal."""
 
 
+class _Seen:
+    """A frame among the last few: its points, and the least misfit to either side so far."""
+
+    def __init__(self, picture: Picture, points: FramePoints, labels: Ints) -> None:
+        self.points = points
+        self.moving = labels > BACKGROUND
+        self.ground = labels == BACKGROUND
+        self.to_object = np.full(len(labels), np.inf, np.float32)
+        self.to_ground = np.full(len(labels), np.inf, np.float32)
+        self._picture = picture
+
+    @cached_property
+    def looks(self) -> tuple[Image, NDArray[np.float64]]:
+        """The picture as it is compared, and its pixels per pixel of the coordinates along x and y.
+
+        Made when first asked for: where nothing moves, nobody does.
+        """
+        grey = self._picture.grey
+        small = _as_tracked(grey)
+        scale = np.array(small.shape[::-1]) / grey.shape[::-1]
+        return np.asarray(cv2.GaussianBlur(small, (0, 0), _BLUR), np.uint8), scale
+
+
 class FigureGround:
     """Compares, frame by frame, what tracks called moving look like with what object and ground would show.
 
-    Of the frames only the last few are kept, and of every observation the least misfit to either side.
-
-    Parameters
-    ----------
-    points : Trajectories
-    labels : (N,) int
-        Label of every row of the trajectories: 0 background, 1, 2, ... moving.
+    Of the frames only the last few are kept, of every observation in them the least misfit to either side,
+    and of every track the sums of these.
 
     Examples
     --------
     ::
 
-        check = FigureGround(points, labels)
-        for grey in frames:
-            check.add(grey)
-        labels[check.on_ground(1.65)] = 0
+        check = FigureGround()
+        for picture, points, labels in frames:
+            check.add(picture, points, labels)
+        off = np.isin(points.ids, check.on_ground(1.65))
     """
 
-    def __init__(self, points: Trajectories, labels: NDArray[np.int32]) -> None:
-        self._points = points
-        self._bounds = np.searchsorted(points.frame, np.arange(points.frames + 1, dtype=np.int32))
-        self._moving = labels > BACKGROUND
-        self._ground = labels == BACKGROUND
-        self._frame = 0
-        self._pictures: deque[Image] = deque(maxlen=max(_LAGS) + 1)
-        self._to_object = np.full(len(labels), np.inf, np.float32)
-        self._to_ground = np.full(len(labels), np.inf, np.float32)
+    def __init__(self) -> None:
+        self._recent: deque[_Seen] = deque(maxlen=max(_LAGS) + 1)
+        self._ids = np.empty(0, np.int64)
+        self._sums = np.empty((0, 3))
+        """Of each of these tracks: rows, and the sums of the roots of their misfits to object and ground."""
 
-    def add(self, grey: Image) -> None:
-        """Take the next frame, (H, W) uint8, in the size of the coordinates."""
-        small = _as_tracked(grey)
-        scale = np.array(small.shape[::-1]) / grey.shape[::-1]
-        reach = _REACH * math.hypot(*small.shape) / 800
-        self._pictures.append(np.asarray(cv2.GaussianBlur(small, (0, 0), _BLUR), np.uint8))
-        for lag in _LAGS:
-            if lag < len(self._pictures):
-                earlier = self._frame - lag
-                self._compare(earlier, self._frame, scale, reach)
-                self._compare(self._frame, earlier, scale, reach)
-        self._frame += 1
+    def add(self, picture: Picture, points: FramePoints, labels: Ints) -> None:
+        """Take the next frame.
 
-    def on_ground(self, least_ratio: float) -> Bools:
-        """Rows (N,) that are called moving but whose track shows the ground.
-
-        A track is judged as a whole, by the mean over its rows of the square root of the misfits: rows in
-        which both sides are covered count little then. It shows the ground unless the ground fits
-        ``least_ratio`` times worse than the object. Where nothing can be told, the track keeps its label: it
-        was compared too seldom, or is so plain that both sides fit.
+        Parameters
+        ----------
+        picture : Picture, in the size of the coordinates.
+        points : FramePoints, ordered by id.
+        labels : (N,) int
+            0 background, 1, 2, ... moving.
         """
-        judged = np.isfinite(self._to_object)
-        names, track = np.unique(self._points.ids, return_inverse=True)
-        rows = np.bincount(track[judged], minlength=len(names))
+        if len(self._recent) == self._recent.maxlen:
+            self._ids, self._sums = self._with_rows_of([self._recent[0]])
+        self._recent.append(_Seen(picture, points, labels))
+        for lag in _LAGS:
+            if lag < len(self._recent):
+                _compare(self._recent[-1 - lag], self._recent[-1])
+                _compare(self._recent[-1], self._recent[-1 - lag])
 
-        def misfit(of_rows: NDArray[np.float32]) -> NDArray[np.float64]:
-            total = np.bincount(track[judged], np.sqrt(of_rows[judged]), len(names))
-            return np.square(total / np.maximum(rows, 1))
+    def on_ground(self, least_ratio: float) -> NDArray[np.int64]:
+        """Tracks (T,), ordered, that were called moving but show the ground.
 
-        to_object, to_ground = misfit(self._to_object), misfit(self._to_ground)
+        A track is judged by the mean over its rows so far of the square root of the misfits: rows in which
+        both sides are covered count little then. It shows the ground unless the ground fits ``least_ratio``
+        times worse than the object. Where nothing can be told, it is not among them: it was compared too
+        seldom, or is so plain that both sides fit.
+        """
+        ids, sums = self._with_rows_of(list(self._recent))
+        rows = sums[:, 0]
+        to_object, to_ground = np.square(sums[:, 1:] / np.maximum(rows, 1)[:, None]).T
         can_tell = (rows >= _LEAST_ROWS) & (np.maximum(to_object, to_ground) > _NOISE)
         shows_ground = can_tell & (to_ground + _NOISE < least_ratio * (to_object + _NOISE))
-        return np.asarray(self._moving & shows_ground[track], bool)
+        return np.asarray(ids[shows_ground], np.int64)
 
-    def _compare(self, here: int, there: int, scale: NDArray[np.float64], reach: float) -> None:
-        """Misfits of the moving rows of frame ``here``, by what frame ``there`` shows."""
-        row, other = self._seen_in_both(here, there)
-        ground, moving = self._ground[row], self._moving[row]
-        if np.count_nonzero(ground) < _LEAST_GROUND or not moving.any():
-            return
-        a, b = ((self._points.xy[rows] + 0.5) * scale - 0.5 for rows in (row, other))
-        distance, nearest = cKDTree(a[ground]).query(a[moving], k=_NEIGHBOURS)
-        with_ground = a[moving] + np.median((b - a)[ground][nearest], axis=1)
-        parted = np.linalg.norm(with_ground - b[moving], axis=1) > _PARTED
-        asked = parted & (np.asarray(distance)[:, 0] <= reach)
-        rows = row[moving][asked]
-        before, after = (self._pictures[frame - self._frame - 1] for frame in (here, there))
-        looks = _patches(before, a[moving][asked])
-        for least, place in ((self._to_object, b[moving]), (self._to_ground, with_ground)):
-            misfit = np.abs(_patches(after, place[asked]) - looks).mean(axis=1)
-            least[rows] = np.minimum(least[rows], misfit)
+    def forget(self, alive: NDArray[np.int64]) -> None:
+        """Drop what is known of all other tracks: they will not come again."""
+        kept = np.isin(self._ids, alive)
+        self._ids, self._sums = self._ids[kept], self._sums[kept]
 
-    def _seen_in_both(self, here: int, there: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows of the tracks seen in two frames, in each of them."""
-        a, b = (slice(*self._bounds[frame : frame + 2]) for frame in (here, there))
-        ids = self._points.ids
-        _, row, other = np.intersect1d(ids[a], ids[b], assume_unique=True, return_indices=True)
-        return a.start + row, b.start + other
+    def _with_rows_of(self, frames: Sequence[_Seen]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Tracks and their sums, with what these frames tell of them."""
+        ids, sums = [self._ids], [self._sums]
+        for frame in frames:
+            judged = np.isfinite(frame.to_object)
+            roots = np.sqrt([frame.to_object[judged], frame.to_ground[judged]])
+            ids.append(frame.points.ids[judged])
+            sums.append(np.vstack([np.ones(roots.shape[1]), roots]).T)
+        names, track = np.unique(np.concatenate(ids), return_inverse=True)
+        total = np.zeros((len(names), 3))
+        np.add.at(total, track, np.concatenate(sums))
+        return names, total
+
+
+def _compare(here: _Seen, there: _Seen) -> None:
+    """Misfits of the moving points of frame ``here``, by what frame ``there`` shows."""
+    _, row, other = np.intersect1d(here.points.ids, there.points.ids, assume_unique=True, return_indices=True)
+    ground, moving = here.ground[row], here.moving[row]
+    if np.count_nonzero(ground) < _LEAST_GROUND or not moving.any():
+        return
+    before, scale = here.looks
+    after, _ = there.looks
+    a = (here.points.xy[row] + 0.5) * scale - 0.5
+    b = (there.points.xy[other] + 0.5) * scale - 0.5
+    reach = _REACH * math.hypot(*before.shape) / 800
+    distance, nearest = cKDTree(a[ground]).query(a[moving], k=_NEIGHBOURS)
+    with_ground = a[moving] + np.median((b - a)[ground][nearest], axis=1)
+    parted = np.linalg.norm(with_ground - b[moving], axis=1) > _PARTED
+    asked = parted & (np.asarray(distance)[:, 0] <= reach)
+    rows = row[moving][asked]
+    looks = _patches(before, a[moving][asked])
+    for least, place in ((here.to_object, b[moving]), (here.to_ground, with_ground)):
+        misfit = np.abs(_patches(after, place[asked]) - looks).mean(axis=1)
+        least[rows] = np.minimum(least[rows], misfit)
 
 
 def _as_tracked(grey: Image) -> Image:

@@ -1,31 +1,129 @@
-"""A clip in windows: which frames, which tracks, and what to say of the tracks that are too short for a
-window."""
+"""A clip in windows: which frames, which tracks, and what each window says of them."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.types import BACKGROUND, UNDECIDED, Tracks
+from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Segmenter, Tracks
 
 _REACH = 35.0
 """Distance over which a short track may take an object's label, pixels of a 640x480 picture."""
 _NEIGHBOURS = 8
 """Neighbours that are asked for the label of a short track."""
 
+Bounds = tuple[int, int]
+"""First and one past the last frame of a window."""
 
-def window_bounds(frames: int, fps: float | None, config: ObjectsConfig) -> list[tuple[int, int]]:
+
+@dataclass(frozen=True)
+class WindowSize:
+    """How many frames a window spans, and every how manyth of them it looks at."""
+
+    length: int
+    stride: int
+
+    @classmethod
+    def at(cls, fps: float | None, config: ObjectsConfig) -> WindowSize:
+        """A second where the rate allows: at high rates not every frame is looked at, at low ones it is
+        longer."""
+        if fps is None:
+            return cls(config.window_frames, 1)
+        stride = max(1, round(config.window_s * fps / config.window_frames))
+        looked_at = min(config.window_frames, max(config.least_frames, round(config.window_s * fps / stride)))
+        return cls(looked_at * stride, stride)
+
+    @property
+    def step(self) -> int:
+        """Frames from one window to the next: half of each lies in the next."""
+        return max(self.length // 2 // self.stride, 1) * self.stride
+
+
+class Windows:
+    """The windows of a clip whose end is not known beforehand."""
+
+    def __init__(self, size: WindowSize) -> None:
+        self._size = size
+        self._start = 0
+        self._last = 0
+        self.count = 0
+        """Windows so far."""
+
+    def complete(self, frames: int) -> Bounds | None:
+        """The next window, once so many frames are there."""
+        stop = self._start + self._size.length
+        if stop > frames:
+            return None
+        window = (self._start, stop)
+        self._start += self._size.step
+        self._last = stop
+        self.count += 1
+        return window
+
+    def end(self, frames: int) -> Bounds | None:
+        """The window that ends with the clip, where the others left frames over."""
+        if frames == self._last:
+            return None
+        self.count += 1
+        return max(0, frames - self._size.length), frames
+
+
+def window_bounds(frames: int, fps: float | None, config: ObjectsConfig) -> list[Bounds]:
     """First and one past the last frame of each window; each overlaps half of the next, the last ends with
     the clip."""
-    length = config.window_frames
-    if fps is not None:
-        length = min(length, max(config.least_frames, round(config.window_s * fps)))
-    if frames <= length:
-        return [(0, frames)] if frames else []
-    starts = list(range(0, frames - length, max(length // 2, 1)))
-    return [(start, start + length) for start in [*starts, frames - length]]
+    windows = Windows(WindowSize.at(fps, config))
+    bounds: list[Bounds] = []
+    while (window := windows.complete(frames)) is not None:
+        bounds.append(window)
+    last = windows.end(frames)
+    return bounds if last is None else [*bounds, last]
+
+
+def gather(
+    frames: Sequence[FramePoints], size: tuple[int, int] | None = None, fps: float | None = None
+) -> Tracks:
+    """Dense tracks of the frames of a window: every track seen at least once there."""
+    counts = [len(frame.ids) for frame in frames]
+    every = np.concatenate([frame.ids for frame in frames])
+    ids, column = np.unique(every, return_inverse=True)
+    row = np.repeat(np.arange(len(frames)), counts)
+    xy = np.full((len(frames), len(ids), 2), np.nan)
+    visible = np.zeros(xy.shape[:2], dtype=bool)
+    xy[row, column] = np.concatenate([frame.xy for frame in frames])
+    visible[row, column] = True
+    return Tracks(xy, visible, ids.astype(np.int64), size, fps)
+
+
+@dataclass(frozen=True)
+class WindowLabeller:
+    """Labels all tracks of a window: those that last are segmented, the others follow their neighbours.
+
+    Parameters
+    ----------
+    segmenter : Segmenter
+    config : ObjectsConfig
+    motions : int, optional
+        Number of motions, where it is known.
+    """
+
+    segmenter: Segmenter
+    config: ObjectsConfig
+    motions: int | None = None
+
+    def __call__(self, tracks: Tracks) -> NDArray[np.int64]:
+        """Labels (P,): 0 background, 1, 2, ... moving, -1 undecided."""
+        least = max(2, self.config.least_life * tracks.frames)
+        lasting = np.flatnonzero(tracks.visible.sum(axis=0) >= least)
+        if not len(lasting):
+            return np.full(tracks.points, UNDECIDED, dtype=np.int64)
+        labels = self.segmenter.segment(tracks.select(lasting), self.motions).labels
+        unit = float(np.hypot(*tracks.size)) / 800 if tracks.size else 1.0
+        return follow_neighbours(tracks, lasting, labels, unit)
 
 
 def follow_neighbours(

@@ -56,6 +56,10 @@ class KltTracker:
         UsageError
             If ``ignore`` has another size than the frames.
         """
+        return self.track_grey((_grey(frame) for frame in frames), ignore)
+
+    def track_grey(self, frames: Iterable[Image], ignore: Bools | None = None) -> Iterator[FramePoints]:
+        """As `track`, of frames (H, W) uint8 that are grey already."""
         life: _Life | None = None
         for frame in frames:
             if life is None:
@@ -90,8 +94,8 @@ class _Life:
         self.after_birth = 0
 
     def advance(self, frame: Image) -> FramePoints:
-        """Take the next frame; return the points seen in it."""
-        grey = self._grey(frame)
+        """Take the next frame, grey; return the points seen in it."""
+        grey = self._as_tracked(frame)
         if min(grey.shape) >= SMALLEST:
             if self.previous is not None:
                 self._live(self.previous, grey)
@@ -185,16 +189,21 @@ class _Life:
             allowed &= masked == 0
         return allowed
 
-    def _grey(self, frame: Image) -> Image:
+    def _as_tracked(self, grey: Image) -> Image:
         width, height = self.full_size
-        if frame.shape != (height, width, 3):
-            raise ValueError(f"expected frames of shape ({height}, {width}, 3), got {frame.shape}")
-        grey = cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
-        if self.shrink > 1:
-            grey = cv2.resize(grey, (self.width, self.height), interpolation=cv2.INTER_AREA)
-        return np.asarray(grey, np.uint8)
+        if grey.shape != (height, width):
+            raise ValueError(f"expected frames of {width}x{height} pixels, got {grey.shape}")
+        if self.shrink == 1:
+            return grey
+        return np.asarray(cv2.resize(grey, (self.width, self.height), interpolation=cv2.INTER_AREA), np.uint8)
 
     def _in_full_size(self, xy: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pixels of the frame as it came: the centre of the top-left pixel is (0, 0) in both sizes."""
         scale = np.array(self.full_size, np.float64) / (self.width, self.height)
         return np.asarray((xy + 0.5) * scale - 0.5, np.float32)
+
+
+def _grey(frame: Image) -> Image:
+    if frame.ndim != 3 or frame.shape[2] != 3:
+        raise ValueError(f"expected frames of shape (H, W, 3), got {frame.shape}")
+    return np.asarray(cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY), np.uint8)

@@ -1,0 +1,211 @@
+"""Labels of one shot, from its first frame to its last, as they become final."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.config import ObjectsConfig
+from ifsvideo.objects.camera_fixed import CameraFixed
+from ifsvideo.objects.figure_ground import FigureGround
+from ifsvideo.objects.linking import Linker
+from ifsvideo.objects.numbering import Numbers
+from ifsvideo.objects.windows import Bounds, Windows, WindowSize, gather
+from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Tracks
+from ifsvideo.video.picture import Picture
+from ifsvideo.worker import value_of
+
+WindowLabels = Callable[[Tracks], "Future[NDArray[np.int64]]"]
+"""Begins to label the tracks of a window: 0 background, 1, 2, ... moving, -1 undecided."""
+
+_UNDER_WAY = 2
+"""Windows that may be under way before the next frame has to wait."""
+
+
+@dataclass(eq=False)
+class Frame:
+    """One frame on its way to its labels.
+
+    Attributes
+    ----------
+    place : int
+        Frames of the clip before it.
+    points : FramePoints, ordered by id.
+    picture : Picture or None
+    shown : int
+        How often it is shown, one time after the other.
+    labels : (N,) int
+        Final once the frame comes out of a `Shot`.
+    """
+
+    place: int
+    points: FramePoints
+    picture: Picture | None = None
+    shown: int = 1
+    labels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+
+@dataclass(frozen=True)
+class _Window:
+    """A window that is being labelled."""
+
+    bounds: Bounds
+    tracks: Tracks
+    labels: Future[NDArray[np.int64]]
+
+
+class Shot:
+    """Collects frames, has their windows labelled, links these, checks borders, and numbers the objects.
+
+    Whether an observation moves is what the window says whose centre is nearest in time; with which object,
+    what most windows say of its track. A frame comes out when the second window after that one is linked: so
+    its labels rest on what is seen up to there, less than two windows later, and on nothing beyond, however
+    long the labelling of a window takes.
+
+    Parameters
+    ----------
+    label : callable
+        Begins to label a window.
+    numbers : Numbers
+    config : ObjectsConfig
+    size : (width, height) of the picture, or None where nobody told.
+    fps : float or None
+    """
+
+    def __init__(
+        self,
+        label: WindowLabels,
+        numbers: Numbers,
+        config: ObjectsConfig,
+        size: tuple[int, int] | None,
+        fps: float | None,
+    ) -> None:
+        self._label = label
+        self._numbers = numbers
+        self._config = config
+        self._size, self._fps = size, fps
+        self._window_size = WindowSize.at(fps, config)
+        self._windows = Windows(self._window_size)
+        self._fixed = CameraFixed(size, fps, config)
+        self._borders = FigureGround()
+        longest_loss = config.longest_loss_s * (fps or 30.0)
+        self._linker = Linker(config.least_shared, config.least_windows, longest_loss)
+        self._least_windows = config.least_windows
+        self._frames: list[Frame] = []
+        self._gone = 0
+        """Frames that came out; the first of the others has this number in the shot."""
+        self._under_way: deque[_Window] = deque()
+        self._linked: deque[tuple[Bounds, NDArray[np.int64], NDArray[np.int64]]] = deque()
+        """Windows that are linked, the ids of their tracks and the labels of these."""
+        self._blocks: deque[int] = deque()
+        """Ends of the blocks of frames, each labelled by one window, that wait for the next to be."""
+
+    def add(self, frame: Frame) -> Iterator[Frame]:
+        """Take the next frame; yields those whose labels are final now."""
+        self._frames.append(frame)
+        self._fixed.add(frame.points)
+        bounds = self._windows.complete(self._gone + len(self._frames))
+        if bounds is not None:
+            self._ask(bounds)
+        while self._under_way and (self._under_way[0].labels.done() or len(self._under_way) > _UNDER_WAY):
+            yield from self._take(self._under_way.popleft())
+
+    @property
+    def last(self) -> Frame | None:
+        """The frame that came in last."""
+        return self._frames[-1] if self._frames else None
+
+    def finish(self) -> Iterator[Frame]:
+        """Yield the rest: no more frames will come."""
+        frames = self._gone + len(self._frames)
+        bounds = self._windows.end(frames)
+        if bounds is not None:
+            self._ask(bounds)
+        self._least_windows = min(self._config.least_windows, self._windows.count)
+        while self._under_way:
+            yield from self._take(self._under_way.popleft())
+        if self._linked:
+            self._prepare(frames)
+        while self._blocks:
+            yield from self._release()
+
+    def _ask(self, bounds: Bounds) -> None:
+        """Have a window labelled; without the tracks that are fixed to the camera."""
+        self._fixed.update()
+        start, stop = (place - self._gone for place in bounds)
+        stride = self._window_size.stride
+        rate = self._fps / stride if self._fps else None
+        tracks = gather([frame.points for frame in self._frames[start:stop:stride]], self._size, rate)
+        tracks = tracks.select(~np.isin(tracks.ids, self._fixed.ids))
+        self._under_way.append(_Window(bounds, tracks, self._label(tracks)))
+
+    def _take(self, window: _Window) -> Iterator[Frame]:
+        """Link a window; that makes the labels of earlier frames final."""
+        stride = self._window_size.stride
+        found = self._linker.link(window.tracks, value_of(window.labels), window.bounds[0], stride)
+        self._linked.append((window.bounds, window.tracks.ids, found))
+        if len(self._linked) > 1:
+            self._prepare((self._linked[0][0][1] + self._linked[1][0][0]) // 2)
+        if len(self._blocks) > 1:
+            yield from self._release()
+
+    def _prepare(self, stop: int) -> None:
+        """Label the frames up to ``stop`` by the first of the linked windows, and look at their borders."""
+        _, ids, found = self._linked.popleft()
+        start = self._blocks[-1] if self._blocks else self._gone
+        self._blocks.append(stop)
+        block = self._frames[start - self._gone : stop - self._gone]
+        for frame in block:
+            frame.labels = np.full(len(frame.points.ids), UNDECIDED, dtype=np.int64)
+            known = np.isin(frame.points.ids, ids)
+            frame.labels[known] = found[np.searchsorted(ids, frame.points.ids[known])]
+        if not self._config.check_borders:
+            return
+        for frame, labels in zip(block, self._labels_now(block), strict=True):
+            if frame.picture is not None:
+                self._borders.add(frame.picture, frame.points, labels)
+
+    def _release(self) -> Iterator[Frame]:
+        """The frames of the first block, their labels final."""
+        known = self._frames[: self._blocks[-1] - self._gone]
+        wanted = self._blocks.popleft() - self._gone
+        on_ground = self._borders.on_ground(self._config.least_ground_misfit)
+        labels = self._labels_now(known, on_ground)
+        final = self._numbers.settle(labels, [frame.place for frame in known], wanted)
+        for frame, own in zip(known, final, strict=False):
+            frame.labels = own.astype(np.int64)
+        del self._frames[:wanted]
+        self._gone += wanted
+        if self._frames:
+            alive = np.unique(np.concatenate([frame.points.ids for frame in self._frames]))
+            for part in (self._fixed, self._borders, self._linker):
+                part.forget(alive)
+        yield from known[:wanted]
+
+    def _labels_now(
+        self, frames: Sequence[Frame], on_ground: NDArray[np.int64] | None = None
+    ) -> list[NDArray[np.int64]]:
+        """Labels (N,) of each frame as far as is known by now; objects as the linker numbers them.
+
+        What too few windows found is background, and so are tracks that show the ground.
+        """
+        if not frames:
+            return []
+        ids = np.concatenate([frame.points.ids for frame in frames])
+        labels = np.concatenate([frame.labels for frame in frames])
+        moving = labels > BACKGROUND
+        tracks, place = np.unique(ids[moving], return_inverse=True)
+        linker = self._linker
+        numbers = np.array([linker.number_of(track) or BACKGROUND for track in tracks.tolist()], np.int64)
+        found_in = np.array([linker.windows_of(number) for number in numbers.tolist()], np.int64)
+        numbers[found_in < self._least_windows] = BACKGROUND
+        if on_ground is not None:
+            numbers[np.isin(tracks, on_ground)] = BACKGROUND
+        labels[moving] = numbers[place]
+        labels[np.isin(ids, self._fixed.ids)] = UNDECIDED
+        return np.split(labels, np.cumsum([len(frame.labels) for frame in frames])[:-1])

@@ -1,0 +1,89 @@
+"""What a run tells of the whole clip, gathered frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ifsvideo.types import BACKGROUND, Counts, Image, Ints, LabelTable, MovingObject, Scene
+
+_GONE = 300
+"""Frames after which a track that is not seen is not seen again."""
+
+
+class Census:
+    """Counts objects, tracks and rows (a `Sink`); memory grows with objects, not with time."""
+
+    wants_image = False
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._tracks = 0
+        self._rows = np.zeros(3, np.int64)
+        self._seen: dict[tuple[int, int], int] = {}
+        """Last frame of every pair of a track and its label, 0 for all tracks."""
+        self._objects: dict[int, MovingObject] = {}
+
+    def add(self, scene: Scene, image: Image | None) -> None:
+        """See `ifsvideo.types.Sink`."""
+        self._frames = scene.frame + 1
+        self._rows += np.bincount(np.sign(scene.labels) + 1, minlength=3)
+        self._tracks += self._new(scene.frame, scene.ids, 0)
+        for label in np.unique(scene.labels[scene.labels > BACKGROUND]).tolist():
+            tracks = self._new(scene.frame, scene.ids[scene.labels == label], label)
+            before = self._objects.get(label, MovingObject(label, scene.time_s, scene.time_s, 0))
+            self._objects[label] = MovingObject(label, before.first_s, scene.time_s, before.tracks + tracks)
+        if scene.frame % _GONE == 0:
+            since = scene.frame - _GONE
+            self._seen = {pair: last for pair, last in self._seen.items() if last >= since}
+
+    def finish(self) -> None:
+        """See `ifsvideo.types.Sink`."""
+
+    @property
+    def objects(self) -> tuple[MovingObject, ...]:
+        """The moving objects, by number."""
+        return tuple(self._objects[label] for label in sorted(self._objects))
+
+    @property
+    def counts(self) -> Counts:
+        """How many frames, tracks and rows there were."""
+        undecided, background, moving = self._rows.tolist()
+        return Counts(self._frames, self._tracks, background, moving, undecided)
+
+    def _new(self, frame: int, ids: Ints, label: int) -> int:
+        """How many of these tracks have not been seen so far."""
+        pairs = [(track, label) for track in ids.tolist()]
+        new = sum(pair not in self._seen for pair in pairs)
+        self._seen.update(dict.fromkeys(pairs, frame))
+        return new
+
+
+class TableSink:
+    """Keeps every row (a `Sink`): the one whose memory grows with points x frames, for the library's user."""
+
+    wants_image = False
+
+    def __init__(self) -> None:
+        self._scenes: list[Scene] = []
+
+    def add(self, scene: Scene, image: Image | None) -> None:
+        """See `ifsvideo.types.Sink`."""
+        self._scenes.append(replace(scene, trails=scene.trails[:0]))
+
+    def finish(self) -> None:
+        """See `ifsvideo.types.Sink`."""
+
+    @property
+    def table(self) -> LabelTable:
+        """All rows so far."""
+        scenes = self._scenes
+        counts = [len(scene.ids) for scene in scenes]
+        return LabelTable(
+            np.repeat(np.arange(len(scenes), dtype=np.int32), counts),
+            np.concatenate([*(scene.ids for scene in scenes), np.empty(0, np.int64)]),
+            np.concatenate([*(scene.xy for scene in scenes), np.empty((0, 2), np.float32)]),
+            np.concatenate([*(scene.labels for scene in scenes), np.empty(0, np.int32)]),
+            len(scenes),
+        )

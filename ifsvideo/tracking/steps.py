@@ -1,0 +1,124 @@
+"""The points of every frame of a clip, and what else is told of it while it is tracked."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ifsvideo.tracking.trajectories import Trajectories
+from ifsvideo.types import Bools, FramePoints, GreyTracker, Image, Tracker
+from ifsvideo.video.picture import Picture
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One frame.
+
+    Attributes
+    ----------
+    points : FramePoints
+        Ordered by id.
+    picture : Picture or None
+        None where the input is tracks.
+    repeats : bool
+        Whether it shows the frame before once more, pixel by pixel.
+    cut : bool
+        Whether another scene begins.
+    """
+
+    points: FramePoints
+    picture: Picture | None = None
+    repeats: bool = False
+    cut: bool = False
+
+
+def follow(
+    tracker: Tracker, pictures: Generator[Picture, None, None], ignore: Bools | None = None
+) -> Generator[Step, None, None]:
+    """Track the frames of a clip; those that repeat the one before are not shown to the tracker.
+
+    Parameters
+    ----------
+    tracker : Tracker
+        A `GreyTracker` is given grey frames.
+    pictures : generator of Picture
+        It is closed in the end.
+    ignore : (H, W) bool, optional
+        True where the picture is not looked at.
+
+    Raises
+    ------
+    ValueError
+        If the tracker does not give points for every frame, or two points of one track.
+    """
+    shown: deque[Picture] = deque()
+    given = taken = 0
+    last: Step | None = None
+
+    def distinct() -> Iterator[Picture]:
+        nonlocal given
+        before: Picture | None = None
+        for picture in pictures:
+            if before is not None and picture.repeats(before):
+                shown.append(before)  # the same object: so a repetition is known, and costs no memory
+                continue
+            before = picture
+            given += 1
+            shown.append(picture)
+            yield picture
+
+    def repetitions() -> Iterator[Step]:
+        while last is not None and shown and shown[0] is last.picture:
+            yield Step(last.points, shown.popleft(), repeats=True)
+
+    with closing(pictures):
+        for points in _points(tracker, distinct(), ignore):
+            yield from repetitions()
+            taken += 1
+            if not shown:
+                break
+            last = Step(ordered(points), shown.popleft())
+            yield last
+        if taken != given:
+            raise ValueError(f"the tracker gave points for {taken} of {given} frames")
+        yield from repetitions()
+
+
+def steps_of(trajectories: Trajectories) -> Iterator[Step]:
+    """The steps of tracks that are there already."""
+    bounds = np.searchsorted(trajectories.frame, np.arange(trajectories.frames + 1))
+    for start, stop in pairwise(bounds.tolist()):
+        yield Step(ordered(FramePoints(trajectories.ids[start:stop], trajectories.xy[start:stop])))
+
+
+def ordered(points: FramePoints) -> FramePoints:
+    """The same points by id.
+
+    Raises
+    ------
+    ValueError
+        If a track has two points.
+    """
+    if (np.diff(points.ids) > 0).all():
+        return points
+    order = np.argsort(points.ids, kind="stable")
+    ids = points.ids[order]
+    twice = np.flatnonzero(np.diff(ids) == 0)
+    if len(twice):
+        raise ValueError(f"track {ids[twice[0]]} has two points in one frame")
+    return FramePoints(ids, points.xy[order])
+
+
+def _points(tracker: Tracker, pictures: Iterator[Picture], ignore: Bools | None) -> Iterable[FramePoints]:
+    if isinstance(tracker, GreyTracker):
+        return tracker.track_grey(_greys(pictures), ignore)
+    return tracker.track((picture.rgb for picture in pictures), ignore)
+
+
+def _greys(pictures: Iterator[Picture]) -> Iterator[Image]:
+    return (picture.grey for picture in pictures)
