@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
@@ -17,7 +18,7 @@ from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, parse_area
 from ifsvideo.lens import check_k1
 from ifsvideo.output.products import Products
-from ifsvideo.video import parse_time
+from ifsvideo.video import ANIMATIONS, FORMATS, parse_time
 
 _Value = TypeVar("_Value")
 
@@ -26,7 +27,7 @@ examples:
   ifsvideo clip.mp4 -o out.mp4            the overlay, and out.csv beside it
   ifsvideo clip.mp4 --start 10 --end 25 --ignore 0,620,1280,100
                                           15 seconds, not looking at the bonnet
-  ifsvideo frames/ --fps 30 -o out.mp4    a folder of images, in natural order
+  ifsvideo *.mp4 -o results/ --jobs 2     many clips, and a page that links what was found
 """
 _STATUS = """\
 exit status: 0 done; 1 fault of the program; 2 wrong use; 3 input cannot be read; 4 output cannot be written;
@@ -46,9 +47,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Arguments:
-    """What the command line asked for."""
+    """What the command line asked for; ``folder`` is that of the results of several inputs."""
 
     jobs: tuple[Job, ...]
+    folder: Path | None
+    workers: int
     config: Config
     fps: Fraction | None
     start: float
@@ -75,9 +78,15 @@ def parse(argv: Sequence[str] | None = None) -> Arguments:
         If it makes no sense. ``--help`` and ``--version`` raise SystemExit.
     """
     told = _parser().parse_args(argv)
+    config = _config(told)
+    output = None if told.output is None else Path(told.output)
+    folder = _folder(told.output, told.input)
+    ending = ".mov" if config.overlay.transparent else ".mp4"
     return Arguments(
-        jobs=_jobs(told.input, told.output, told.labels, _products(told)),
-        config=_config(told),
+        jobs=_jobs(told.input, output, folder, told.labels, _products(told), ending),
+        folder=folder,
+        workers=told.jobs,
+        config=config,
         fps=told.fps,
         start=told.start,
         end=told.end,
@@ -114,9 +123,9 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "-o",
         "--output",
-        type=Path,
         metavar="FILE",
-        help="overlay: .mp4, .mov, .mkv, .gif or .webp (default: INPUT.ifs.mp4 beside the input)",
+        help="overlay: .mp4, .mov, .mkv, .gif or .webp (default: INPUT.ifs.mp4 beside the input); or a "
+        "folder: overlay, labels, report and summary of each input, and an index.html",
     )
     files.add_argument(
         "--labels", type=Path, metavar="FILE", help="label of every point (default: .csv beside the overlay)"
@@ -216,6 +225,9 @@ def _add_showing(parser: argparse.ArgumentParser) -> None:
 
 def _add_running(parser: argparse.ArgumentParser) -> None:
     running = parser.add_argument_group("running")
+    running.add_argument(
+        "--jobs", type=_option(_whole), default=1, metavar="N", help="inputs run at once (default: 1)"
+    )
     running.add_argument("--quiet", action="store_true", help="print nothing but errors")
     running.add_argument("--debug", action="store_true", help="show where in the program an error arose")
     running.add_argument("--version", action="version", version=f"ifsvideo {__version__}")
@@ -298,13 +310,37 @@ def _products(told: argparse.Namespace) -> Products:
     return Products(summary=told.json, **{name: getattr(told, name) for name in names})
 
 
+def _folder(output: str | None, sources: Sequence[Path]) -> Path | None:
+    """The folder that -o names; None where it names a file, or nothing."""
+    if not output:
+        return None
+    place = Path(output)
+    like_a_file = place.suffix.lower() in (*FORMATS, *ANIMATIONS)
+    if output.endswith(("/", os.sep)) or (place.is_dir() and not like_a_file):
+        return place
+    if len(sources) == 1:
+        return None
+    if like_a_file:
+        raise UsageError(f"-o {output} would name one file for several inputs; name a folder: results/")
+    return place
+
+
 def _jobs(
-    sources: Sequence[Path], output: Path | None, labels: Path | None, products: Products
+    sources: Sequence[Path],
+    output: Path | None,
+    folder: Path | None,
+    labels: Path | None,
+    products: Products,
+    ending: str,
 ) -> tuple[Job, ...]:
     """What is written of each input."""
-    if len(sources) > 1 and (output or labels or any(products.named())):
-        raise UsageError("-o and the like name one file; give one input, or leave them out")
-    jobs = tuple(_job(source, output, labels, products) for source in sources)
+    several = len(sources) > 1 or folder is not None
+    if several and (labels or any(products.named())):
+        raise UsageError("--labels and the like name one file; give one input and one -o, or leave them out")
+    if folder is not None:
+        jobs = tuple(_job_in(folder, source, ending) for source in sources)
+    else:
+        jobs = tuple(_job(source, output, labels, products, ending) for source in sources)
     places = [job.labels for job in jobs]
     twice = next((place for place in places if places.count(place) > 1), None)
     if twice is not None:
@@ -312,12 +348,25 @@ def _jobs(
     return jobs
 
 
-def _job(source: Path, output: Path | None, labels: Path | None, products: Products) -> Job:
+def _job(source: Path, output: Path | None, labels: Path | None, products: Products, ending: str) -> Job:
     if output is not None and not output.name:
         raise UsageError("-o needs the name of a file, such as out.mp4")
     if output is None:
-        place = source if source.name else source.resolve()
-        output = place.with_name(f"{place.name if place.is_dir() else place.stem}.ifs.mp4")
+        output = _named(source.parent, source, ending)
         if is_tracks_file(source):
             return Job(source, None, labels or output.with_suffix(".csv"), products)
     return Job(source, output, labels or output.with_suffix(".csv"), products)
+
+
+def _job_in(folder: Path, source: Path, ending: str) -> Job:
+    """All that a folder of results holds of an input."""
+    output = _named(folder, source, ending)
+    products = Products(report=output.with_suffix(".html"), summary=output.with_suffix(".json"))
+    return Job(source, None if is_tracks_file(source) else output, output.with_suffix(".csv"), products)
+
+
+def _named(folder: Path, source: Path, ending: str) -> Path:
+    """Where the overlay of an input goes, unless it is told."""
+    place = source if source.name else source.resolve()
+    folder = place.parent if folder == source.parent else folder
+    return folder / f"{place.name if place.is_dir() else place.stem}.ifs{ending}"

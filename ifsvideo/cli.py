@@ -5,20 +5,20 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 import traceback
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
+from functools import partial
 from types import FrameType
 from typing import Any
 
 from tqdm import tqdm
 
 from ifsvideo.arguments import Arguments, Job, parse
+from ifsvideo.batch import Outcome, each_done, local_executor, perform
 from ifsvideo.errors import IfsVideoError
-from ifsvideo.pipeline import Pipeline
-from ifsvideo.summary import summary
+from ifsvideo.ledger import Ledger
 
 _DONE, _FAULT, _SOME_FAILED = 0, 1, 5
 
@@ -55,41 +55,66 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _report(error, debug)
 
 
-def _run(arguments: Arguments, debug: bool) -> int:
-    pipeline = Pipeline(arguments.config)
-    if len(arguments.jobs) == 1:
-        _process(pipeline, arguments.jobs[0], arguments)
+def _run(told: Arguments, debug: bool) -> int:
+    if len(told.jobs) == 1 and told.folder is None:
+        _process(told.jobs[0], told)
         return _DONE
-    failed = False
-    for job in arguments.jobs:
-        try:
-            _process(pipeline, job, arguments)
-        except BrokenPipeError:
-            raise
-        except Exception as error:
-            _report(error, debug)
-            failed = True
-    return _SOME_FAILED if failed else _DONE
+    ledger = Ledger(told.folder) if told.folder is not None else None
+    failures = []
+    with closing(_outcomes(told, ledger)) as outcomes:
+        for job, outcome in outcomes:
+            if ledger is not None:
+                ledger.note(job, told, outcome)
+            if isinstance(outcome, Exception):
+                failures.append(outcome)
+            elif not told.quiet:
+                _say(outcome.text)
+    if ledger is not None:
+        ledger.write()
+        if not told.quiet:
+            _say(f"{ledger.page}: all results")
+    for failure in failures:
+        _report(failure, debug)
+    if failures:
+        _complain(f"{len(failures)} of {len(told.jobs)} inputs failed")
+    return _SOME_FAILED if failures else _DONE
 
 
-def _process(pipeline: Pipeline, job: Job, arguments: Arguments) -> None:
-    begun = time.perf_counter()
-    with _Bar(arguments.quiet) as bar:
-        result = pipeline.run(
-            job.source,
-            job.output,
-            job.labels,
-            fps=arguments.fps,
-            start=arguments.start,
-            end=arguments.end,
-            ignore=arguments.ignore,
-            motions=arguments.motions,
-            products=job.products,
-            keep_table=False,
-            progress=bar.show,
-        )
-    if not arguments.quiet:
-        print(summary(str(job.source), result, time.perf_counter() - begun), flush=True)
+def _outcomes(
+    told: Arguments, ledger: Ledger | None
+) -> Generator[tuple[Job, Outcome | Exception], None, None]:
+    """What became of each input that is not done already, as they are done."""
+    jobs = [job for job in told.jobs if ledger is None or not ledger.complete(job, told)]
+    if not told.quiet and len(jobs) < len(told.jobs):
+        _say(f"{len(told.jobs) - len(jobs)} of {len(told.jobs)} inputs are done already, and unchanged")
+    if told.workers == 1:
+        yield from each_done(iter(jobs), lambda job: _with_bar(job, told), local_executor(1), 1)
+        return
+    work = partial(perform, told=told)
+    workers = local_executor(told.workers)
+    with (
+        tqdm(total=len(jobs), unit="clip", file=sys.stderr, disable=told.quiet, dynamic_ncols=True) as bar,
+        closing(each_done(iter(jobs), work, workers, told.workers)) as outcomes,
+    ):
+        for job, outcome in outcomes:
+            bar.update()
+            with bar.external_write_mode(sys.stderr):
+                yield job, outcome
+
+
+def _process(job: Job, told: Arguments) -> None:
+    outcome = _with_bar(job, told)
+    if not told.quiet:
+        _say(outcome.text)
+
+
+def _with_bar(job: Job, told: Arguments) -> Outcome:
+    with _Bar(told.quiet) as bar:
+        return perform(job, told, bar.show)
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
 def _report(error: Exception, debug: bool) -> int:
@@ -102,8 +127,12 @@ def _report(error: Exception, debug: bool) -> int:
         kind = type(error).__name__
         hint = "" if debug else "; run again with --debug and report what it prints"
         message, status = f"a fault of the program ({kind}: {error}){hint}", _FAULT
-    print("ifsvideo: error:", " ".join(message.split()), file=sys.stderr)
+    _complain(message)
     return status
+
+
+def _complain(message: str) -> None:
+    print("ifsvideo: error:", " ".join(message.split()), file=sys.stderr)
 
 
 class _Bar:

@@ -37,13 +37,18 @@ def fill(name: str, facts: str, data: Mapping[str, Any], video: str) -> str:
     parts = {
         "title": html.escape(name),
         "facts": html.escape(facts),
-        "style": _part("page.css"),
         "script": _part("page.js"),
         "data": as_script(data),
         "video": player if video else "",
     }
+    return filled("page.html", parts)
+
+
+def filled(template: str, parts: Mapping[str, str]) -> str:
+    """A template with its places filled by HTML, and the style."""
+    parts = {"style": _part("page.css"), **parts}
     # In one go over the template, so that nothing that is filled in is looked through again.
-    return _PLACE.sub(lambda place: parts[place[1] or place[2]], _part("page.html"))
+    return _PLACE.sub(lambda place: parts[place[1] or place[2]], _part(template))
 
 
 def as_script(data: Mapping[str, Any]) -> str:

@@ -5,10 +5,11 @@ from ifsvideo.video.animation import AnimationWriter
 from ifsvideo.video.opening import open_source
 from ifsvideo.video.source import FrameSource
 from ifsvideo.video.timecode import parse_time
-from ifsvideo.video.writer import VideoWriter, check_output
+from ifsvideo.video.writer import FORMATS, VideoWriter, check_output
 
 __all__ = [
     "ANIMATIONS",
+    "FORMATS",
     "AnimationWriter",
     "FrameSource",
     "VideoWriter",

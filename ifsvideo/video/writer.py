@@ -27,7 +27,7 @@ _COPIED_SOUND = {
 }
 """Codecs that the container holds and common players play; other sound is encoded again, as AAC."""
 _ENCODER = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-threads", "2"]
-_ENCODER_FOR_PAGES = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "26", "-g", "15", "-threads", "2"]
+_ENCODER_FOR_PAGES = ["-c:v", "libx264", "-preset", "superfast", "-crf", "27", "-g", "15", "-threads", "2"]
 # One matrix for every size, and the tags that say so: players guess by the size where tags are missing.
 _COLOURS = (
     "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p,"
