@@ -6,9 +6,10 @@ tracks      DIR or its subfolders hold tracks of your own, NAME.npz: xy (F, P, 2
             optional visible (F, P), labels (P,) integers: groups from 1, 0 not known; or .mat as above
 samples     DIR holds NAME.mp4 and NAME_truth.npz (masks (F, H, W) uint8: 0 background, k object k)
 
-and, with options of their own (objects --help, static --help, marked --help),
+and, with options of their own (objects --help, cost --help, static --help, marked --help),
 
 objects DIR      the sample clips: boxes, times to contact and events of the objects
+cost CLIP        what the further outputs cost, beside the overlay alone
 static CLIP ...  clips in which nothing moves: how much is called moving, or not decided
 marked CLIP ...  real clips in which what moves was marked by hand: how much of it is found, and what besides
 
@@ -56,6 +57,7 @@ from typing import NoReturn
 
 from ifsvideo.benchmark import (
     comparison,
+    cost,
     datasets,
     driving,
     learning,
@@ -110,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run, options = _learn, _learning_parser().parse_args(line[1:])
     elif line[:1] == ["objects"]:
         run, options = objects.measure, objects.parser().parse_args(line[1:])
+    elif line[:1] == ["cost"]:
+        run, options = cost.measure, cost.parser().parse_args(line[1:])
     elif line[:1] == ["static"]:
         run, options = static.measure, static.parser().parse_args(line[1:])
     elif line[:1] == ["marked"]:

@@ -81,14 +81,19 @@ def stretch(before: Floats, after: Floats) -> NDArray[np.float64]:
     found = np.zeros(3)
     for _ in range(_ROUNDS):
         weighted = (length / np.maximum(np.abs(residual), _NOISE / length))[:, None] * design
-        found = np.linalg.lstsq(weighted.T @ design, weighted.T @ growth, rcond=1e-9)[0]
+        found = np.linalg.solve(_regular(weighted.T @ design), weighted.T @ growth)
         residual = growth - design @ found
     # A length's error is sqrt(2) times that of a point; n points make n (n - 1) / 2 pairs, but tell only
     # what n of them tell.
     noise = np.hypot(np.median(np.abs(residual) * length) / 0.6745 / np.sqrt(2.0), _NOISE)
     told = (np.square(length)[:, None] * design).T @ design / 2.0 * (len(before) - 1) / len(growth)
-    error = noise * np.sqrt(max(0.0, np.linalg.pinv(told, rcond=1e-9, hermitian=True)[0, 0]))
+    error = noise * np.sqrt(np.linalg.inv(_regular(told))[0, 0])
     return np.append(found, error)
+
+
+def _regular(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The normal equations, solvable also where all pairs have one direction: then their error is large."""
+    return np.asarray(normal + 1e-9 * np.trace(normal) * np.eye(3), np.float64)
 
 
 @dataclass(frozen=True)
