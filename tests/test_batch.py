@@ -48,7 +48,7 @@ def times(folder: Path) -> dict[str, int]:
 
 
 def links(page: Path) -> list[str]:
-    return [unquote(found) for found in re.findall(r'href="\./([^"]*)"', page.read_text(encoding="utf-8"))]
+    return [unquote(found) for found in re.findall(r'href="\./([^"#]*)"', page.read_text(encoding="utf-8"))]
 
 
 def test_one_folder_holds_everything_and_a_page_links_it(inputs, tmp_path, capsys):
@@ -161,7 +161,7 @@ def test_names_from_outside_are_text():
     assert "<script>" not in page
     assert "%3Cb%3E%26%22.ifs.html" in page
     assert "2 clips, 1 failed" in page
-    assert "2.5 s at 0:01.00" in page
+    assert '2.5 s <a href="./%3Cb%3E%26%22.ifs.html#t=1">at 0:01.00</a>' in page
 
 
 @dataclass(frozen=True)

@@ -182,6 +182,15 @@ def test_plots_follow_the_choice(page):
     assert 0.5 < time_of(page) < 2.6
 
 
+def test_an_address_can_name_a_moment(window, pages):
+    window.open("about:blank")
+    window.open(pages["two"].as_uri() + "#t=1.25")
+    window.until("return document.getElementById('clock').textContent === '0:01.25'")
+    assert time_of(window) == pytest.approx(1.275, abs=0.02)
+    window.run("location.hash = '#t=2'")
+    window.until("return document.getElementById('clock').textContent === '0:02.00'")
+
+
 def test_names_from_outside_are_text(page):
     assert page.run("return document.querySelector('h1').textContent") == 'two & <b> "quoted".mp4'
     assert page.run("return document.querySelectorAll('h1 b').length") == 0

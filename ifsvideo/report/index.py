@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ifsvideo.output.legend import clock
@@ -34,10 +34,21 @@ def _row(name: str, entry: Mapping[str, Any]) -> str:
     links = {_kind(file): file for file in entry["files"]}
     report = links.pop("report", None)
     title = _link(report, name) if report else html.escape(name)
-    contact = f"{entry['contact'][1]:.1f} s at {clock(entry['contact'][0])}" if entry["contact"] else "–"
+    contact = _contact(entry["contact"], report)
     files = " ".join(_link(file, kind, name) for kind, file in sorted(links.items()) if kind)
     cells = (clock(entry["length_s"]), str(entry["objects"]), str(entry["events"]), contact, files)
     return f'<tr><th scope="row">{title}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _contact(shortest: Sequence[float] | None, report: str | None) -> str:
+    """The shortest time to contact, and when; a link to that moment."""
+    if shortest is None:
+        return "–"
+    time_s, contact_s = shortest
+    moment = f"at {clock(time_s)}"
+    if report:
+        moment = f'<a href="{html.escape(beside(report))}#t={time_s:g}">{moment}</a>'
+    return f"{contact_s:.1f} s {moment}"
 
 
 def _kind(file: str) -> str:

@@ -522,4 +522,12 @@
   labelTimeline();
   choose(chosen);
   show();
+  // An address that ends in #t=12.5 shows that moment of the input.
+  const jump = () => {
+    const wanted = /^#t=(\d+(?:\.\d+)?)$/.exec(location.hash);
+    if (wanted) seek(outputTime(Number(wanted[1])));
+  };
+  if (video && !video.readyState) video.addEventListener("loadedmetadata", jump, {once: true});
+  else jump();
+  window.addEventListener("hashchange", jump);
 })();
