@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -188,6 +189,25 @@ class TestDrives:
         events = history(scenes).events
         assert [event.time_s for event in events] == pytest.approx([0.0, 1.48, 2.6], abs=0.05)
         assert events[2].text == "object 1 appears again"
+
+    def test_a_cut_is_no_event_of_an_object(self):
+        first = drive(lambda t: (0.0, 20.0 + 12.0 * t, 0.0), seconds=1.5)
+        second = drive(lambda t: (1.0, 18.0 + 12.0 * t, 0.0), seconds=1.5)
+        moved = [
+            replace(
+                scene,
+                frame=scene.frame + len(first),
+                time_s=scene.time_s + 1.5,
+                ids=scene.ids + 1_000_000,
+                labels=2 * scene.labels,
+            )
+            for scene in second
+        ]
+        told = history([*first, *moved]).events
+        assert [(event.time_s, event.text) for event in told] == [
+            (0.0, "object 1 is in sight at the beginning"),
+            (1.5, "object 2 is in sight at the beginning of a shot"),
+        ]
 
     def test_a_car_that_stops_and_starts(self):
         where = lambda t: (2.0, 70.0 + 6.0 * max(0.0, min(t, 3.5) - 1.0), 0.0)  # noqa: E731

@@ -30,7 +30,7 @@ KINDS = (
 _GAP_S = 0.5
 """Out of sight for longer, seconds, an object was gone; shorter, its points were only lost for a moment."""
 _EDGE_S = 0.5
-"""What is in sight this near the clip's beginning or end, seconds, was so before, or will be after."""
+"""What is in sight this near the beginning or end of a shot, seconds, was so before, or will be after."""
 _NEAR_S = 0.4
 """Seconds at either end of a sight in which it is looked for how the object came or went."""
 _OUT_S = 0.7
@@ -67,6 +67,8 @@ class Sights:
         As of `ifsvideo.objects.standing.Standing`.
     again : bool
         Whether it was seen before this.
+    shot : (first, stop)
+        Frames between two cuts, or the ends of the clip, in which it is seen.
     """
 
     rows: ObjectTable
@@ -75,6 +77,7 @@ class Sights:
     stood_before: float
     stood_after: float
     again: bool
+    shot: tuple[int, int]
 
 
 def split(frame: NDArray[np.int32], fps: float) -> list[slice]:
@@ -83,8 +86,8 @@ def split(frame: NDArray[np.int32], fps: float) -> list[slice]:
     return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(frame)])]
 
 
-def events_of(sights: Sights, info: VideoInfo, frames: int) -> Iterator[Event]:
-    """What happened to an object while it was in sight; ``frames`` is how many the clip has."""
+def events_of(sights: Sights, info: VideoInfo) -> Iterator[Event]:
+    """What happened to an object while it was in sight."""
     rows = sights.rows
     fps = float(info.fps)
     name = f"object {rows.object[0]}"
@@ -105,7 +108,7 @@ def events_of(sights: Sights, info: VideoInfo, frames: int) -> Iterator[Event]:
     if crossed is not None:
         row, way = crossed
         yield event(row, "crosses", f"crosses from {way}")
-    if frames - rows.frame[-1] <= _EDGE_S * fps:
+    if sights.shot[1] - rows.frame[-1] <= _EDGE_S * fps:
         return
     side_out = _leaving(rows, borders[-near:], info)
     if side_out is not None and _falls_behind(sights, side_out, fps):
@@ -126,8 +129,9 @@ def _borders(rows: ObjectTable, info: VideoInfo) -> NDArray[np.bool_]:
 
 
 def _appearing(sights: Sights, borders: NDArray[np.bool_], fps: float) -> str:
-    if sights.rows.frame[0] <= _EDGE_S * fps:
-        return "is in sight at the beginning"
+    first = sights.shot[0]
+    if sights.rows.frame[0] - first <= _EDGE_S * fps:
+        return "is in sight at the beginning" + (" of a shot" if first > _EDGE_S * fps else "")
     if sights.stood_before >= _STOOD:
         return "starts to move"
     again = " again" if sights.again else ""
@@ -143,7 +147,7 @@ def _passing(sights: Sights, borders: NDArray[np.bool_], info: VideoInfo) -> str
     """Side on which it came past us: in over the edge, and on ahead, our way; None if it did not."""
     rows, fps = sights.rows, float(info.fps)
     touched = borders[: max(1, round(_NEAR_S * fps)), :2].any(axis=0)
-    if rows.frame[0] <= _EDGE_S * fps or not touched.any():
+    if rows.frame[0] - sights.shot[0] <= _EDGE_S * fps or not touched.any():
         return None
     side = int(np.argmax(touched))
     at_edge = np.flatnonzero(borders[:, side])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -27,18 +28,19 @@ _BETTER = 1.2
 """How much larger than the last thumbnail's an object's box must be for a new one to be taken."""
 
 
-@dataclass(frozen=True)
-class _Sight:
-    """What is measured of one object in one frame; steps and stretch are those since the frame before."""
-
-    frame: int
-    time_s: float
-    points: int
-    box: NDArray[np.float64]
-    own: NDArray[np.float64]
-    around: NDArray[np.float64]
-    stretch: NDArray[np.float64]
-    foot: float
+_SIGHT = np.dtype(
+    [
+        ("frame", float),
+        ("time_s", float),
+        ("points", float),
+        ("box", float, (4,)),
+        ("own", float, (2,)),
+        ("around", float, (2,)),
+        ("stretch", float, (4,)),
+        ("foot", float),
+    ]
+)
+"""What is measured of one object in one frame; steps and stretch are those since the frame before."""
 
 
 class ObjectHistory:
@@ -71,7 +73,8 @@ class ObjectHistory:
         self._before = FramePoints(np.empty(0, np.int64), np.empty((0, 2), np.float32))
         self._standing = Standing(float(info.fps))
         self._frames = 0
-        self._sights: dict[int, list[_Sight]] = {}
+        self._shots: list[int] = []
+        self._sights: dict[int, array[float]] = {}
         self._extent: dict[int, float] = {}
 
     def add(self, scene: Scene, image: Image | None) -> None:
@@ -86,64 +89,67 @@ class ObjectHistory:
             box = point_box(scene.xy[on_it], self._diagonal)
             grown = stretch(before[both], scene.xy[both])
             foot = foot_step(own, grown[0], scene.xy[both], box, before[ground], scene.xy[ground])
-            points = int(np.count_nonzero(on_it))
-            sight = _Sight(scene.frame, scene.time_s, points, box, own, around, grown, foot)
-            self._sights.setdefault(number, []).append(sight)
+            sight = (scene.frame, scene.time_s, np.count_nonzero(on_it), *box, *own, *around, *grown, foot)
+            self._sights.setdefault(number, array("d")).extend(sight)
             if image is not None and self.wants_image:
-                self._keep_thumbnail(number, sight.box, image)
+                self._keep_thumbnail(number, box, image)
+        if len(scene.ids) and not known.any():
+            self._shots.append(scene.frame)
         self._before = FramePoints(scene.ids, scene.xy)
         self._standing.add(scene)
         self._frames += 1
 
     def finish(self) -> None:
         """Make the table and the events."""
-        tables = {number: self._rows(number, sights) for number, sights in self._sights.items()}
-        self.table = ObjectTable.joined(tables.values())
-        found = [event for number, rows in tables.items() for event in self._events(number, rows)]
+        self._shots.append(self._frames)
+        tables: list[ObjectTable] = []
+        found: list[Event] = []
+        for number, numbers in self._sights.items():
+            sights = np.frombuffer(numbers, _SIGHT).copy()
+            rows = self._rows(number, sights)
+            tables.append(rows)
+            found += self._events(rows, sights)
+        self.table = ObjectTable.joined(tables)
         self.events = tuple(sorted(found, key=lambda event: (event.frame, event.object)))
 
-    def _events(self, number: int, rows: ObjectTable) -> Iterator[Event]:
-        """What happened to one object."""
-        foot = np.array([sight.foot for sight in self._sights[number]])
-        around = np.array([np.hypot(*sight.around) for sight in self._sights[number]])
-        for stretch_of in split(rows.frame, float(self._info.fps)):
-            seen = rows.select(np.arange(len(rows))[stretch_of])
-            first, last = (number, int(seen.frame[0])), (number, int(seen.frame[-1]))
-            sights = Sights(
-                seen,
-                foot[stretch_of],
-                around[stretch_of],
-                self._standing.before.get(first, 0.0),
-                self._standing.after.get(last, 0.0),
-                again=stretch_of.start > 0,
-            )
-            yield from events_of(sights, self._info, self._frames)
-
-    def _rows(self, number: int, sights: list[_Sight]) -> ObjectTable:
+    def _rows(self, number: int, sights: NDArray[Any]) -> ObjectTable:
         """The table of one object."""
         fps = float(self._info.fps)
-        frame = np.array([sight.frame for sight in sights], np.int32)
-        own, around, stretched, boxes = (
-            np.array([getattr(sight, name) for sight in sights])
-            for name in ("own", "around", "stretch", "box")
-        )
         # Seen again after a gap, its points may have been seen in the frame before as another's.
-        again = np.diff(frame, prepend=-2) > 1
-        for steps_since in (own, around, stretched):
-            steps_since[again] = np.nan
+        again = np.diff(sights["frame"], prepend=-2) > 1
+        for steps_since in ("own", "around", "stretch"):
+            sights[steps_since][again] = np.nan
         size = (self._info.width, self._info.height)
-        left, top, right, bottom = steady_boxes(boxes, own, stretched[:, 0], fps, size).T
-        vx, vy = velocity(own, around, fps).T
-        nearing = contact(stretched, fps)
+        growth = sights["stretch"][:, 0]
+        left, top, right, bottom = steady_boxes(sights["box"], sights["own"], growth, fps, size).T
+        vx, vy = velocity(sights["own"], sights["around"], fps).T
+        nearing = contact(sights["stretch"], fps)
         box = (left, top, right - left, bottom - top, (left + right) / 2, (top + bottom) / 2)
         measures = (*box, vx, vy, nearing.scale_rate, nearing.ttc_s, nearing.confidence)
         return ObjectTable(
-            frame,
-            np.array([sight.time_s for sight in sights]),
+            sights["frame"].astype(np.int32),
+            sights["time_s"],
             np.full(len(sights), number, np.int32),
-            np.array([sight.points for sight in sights], np.int32),
+            sights["points"].astype(np.int32),
             *(measure.astype(np.float32) for measure in measures),
         )
+
+    def _events(self, rows: ObjectTable, sights: NDArray[Any]) -> Iterator[Event]:
+        """What happened to one object."""
+        shots = np.array(self._shots)
+        for part in split(rows.frame, float(self._info.fps)):
+            seen = rows.select(np.arange(len(rows))[part])
+            first, last, number = int(seen.frame[0]), int(seen.frame[-1]), int(seen.object[0])
+            one = Sights(
+                seen,
+                sights["foot"][part],
+                np.hypot(*sights["around"][part].T),
+                self._standing.before.get((number, first), 0.0),
+                self._standing.after.get((number, last), 0.0),
+                again=part.start > 0,
+                shot=(int(shots[shots <= first][-1]), int(shots[shots > last][0])),
+            )
+            yield from events_of(one, self._info)
 
     def _keep_thumbnail(self, number: int, box: NDArray[np.float64], image: Image) -> None:
         """Cut the object out, where it is larger than in the picture of it that is kept."""

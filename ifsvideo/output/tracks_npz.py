@@ -98,13 +98,14 @@ class TracksSink:
                     member.write(frame.tobytes())
 
     def _write_rows(self, archive: zipfile.ZipFile) -> None:
-        counts = np.array(self._counts)
-        frame = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
-        _write(archive, "frame", frame)
-        _write(archive, "frames", np.array(len(counts)))
+        total = sum(self._counts)
+        _write(archive, "frames", np.array(len(self._counts)))
+        with _member(archive, "frame", (total,), np.dtype(np.int32)) as member:
+            for frame, count in enumerate(self._counts):
+                member.write(np.full(count, frame, np.int32).tobytes())
         for name, field, tail in (("track", "ids", ()), ("xy", "xy", (2,)), ("labels", "labels", ())):
             dtype = _ROW[field].base
-            with _member(archive, name, (len(frame), *tail), dtype) as member:
+            with _member(archive, name, (total, *tail), dtype) as member:
                 for rows in self._read():
                     member.write(np.ascontiguousarray(rows[field]).tobytes())
 
