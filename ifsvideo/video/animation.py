@@ -9,19 +9,15 @@ need be. Of a GIF: pictures a second (down to `LEAST_RATE`), width (down to `LEA
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
-from typing import Self
-
-import numpy as np
 
 from ifsvideo.errors import OutputError
 from ifsvideo.output.atomic import Outputs
-from ifsvideo.types import Image, VideoInfo
+from ifsvideo.types import VideoInfo
 from ifsvideo.video import ffmpeg
+from ifsvideo.video.feeding import FedWriter
 
 ENDINGS = {".gif": "gif", ".webp": "webp"}
 """Output endings and ffmpeg's name of the format."""
@@ -79,7 +75,7 @@ def _level(rung: Rung, fps: Fraction, width: int, height: int) -> list[Rung]:
     return [replace(rung, level=level) for level in range(1, len(_COLOURS))]
 
 
-class AnimationWriter:
+class AnimationWriter(FedWriter):
     """Writes frames to an animated GIF or WebP that plays for ever (as `ifsvideo.video.VideoWriter`).
 
     Parameters
@@ -117,148 +113,86 @@ class AnimationWriter:
         transparent: bool = False,
         max_bytes: int | None = None,
     ) -> None:
-        self.path = path
-        self.frames = 0
-        self.warnings: tuple[str, ...] = ()
-        self._info = info
-        self._group = outputs
-        self._channels = 4 if transparent else 3
+        super().__init__(path, info, outputs, transparent)
         self._max_bytes = max_bytes
         self._gif = path.suffix.lower() == ".gif"
 
-    def __enter__(self) -> Self:
-        self._own = Outputs()
-        self._complete = False
-        try:
-            self._target = (self._group or self._own).add(self.path)
-            self._kept = self._own.add_scratch(self._target.with_suffix(".mkv"))
-            self._palette = self._own.add_scratch(self._target.with_suffix(".png"))
-            self._child = ffmpeg.Ffmpeg(self._keeping(), feeds=True)
-        except BaseException:
-            self._own.discard()
-            raise
-        return self
+    def _arguments(self) -> list[str]:
+        """Keep the frames as they are."""
+        self._kept = self._own.add_scratch(self._target.with_suffix(".mkv"))
+        self._palette = self._own.add_scratch(self._target.with_suffix(".png"))
+        pixels = "bgra" if self._transparent else "bgr0"
+        return [
+            *self._input(self._info.width, self._info.height),
+            *("-c:v", "ffv1", "-level", "3", "-pix_fmt", pixels),
+            *("-f", "matroska", "-y", ffmpeg.file_url(self._kept)),
+        ]
 
-    def write(self, image: Image) -> None:
-        """Append one frame, (H, W, 3) uint8 RGB, or (H, W, 4) RGBA where it is transparent."""
-        expected = (self._info.height, self._info.width, self._channels)
-        if image.shape != expected or image.dtype != np.uint8:
-            raise ValueError(f"expected uint8 image of shape {expected}, got {image.dtype} {image.shape}")
-        try:
-            self._child.stdin.write(np.ascontiguousarray(image).data.cast("B"))
-        except OSError:
-            self._child.wait()
-            raise self._failure(self._child.printed()) from None
-        self.frames += 1
+    def _complete(self) -> None:
+        """Write the animation, as often as its size asks for."""
+        rung, given_up = self._fitting()
+        if given_up:
+            rate = f"{float(self._info.fps / rung.every):.4g} pictures a second"
+            level = f"{_COLOURS[rung.level]} colours" if self._gif else f"quality {_QUALITY[rung.level]}"
+            allowed = f"{(self._max_bytes or 0) / 1e6:g} MB"
+            self._warn(f"{rung.width}x{rung.height}, {rate}, {level}, to keep {allowed}")
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            if kind is None:
-                self.finish()
-        except BaseException as failure:
-            kind, error, trace = type(failure), failure, failure.__traceback__
-            raise
-        finally:
-            self._child.stop()
-            self._own.__exit__(kind, error, trace)
-
-    def finish(self) -> None:
-        """Write the animation, as often as its size asks for; leaving the context well does it too.
-
-        Raises
-        ------
-        OutputError
-            See the class.
-        """
-        if self._complete:
-            return
-        with suppress(OSError):  # where ffmpeg has died, its exit status says more
-            self._child.stdin.close()
-        if self._child.wait() != 0:
-            raise self._failure(self._child.printed())
-        if self.frames == 0:
-            raise OutputError(f"{self.path}: no frame was written; nothing is left to place there")
-        self._tell(self._fitting())
-        self._complete = True
-
-    def _fitting(self) -> Rung:
-        """Write it the best way that keeps the size."""
+    def _fitting(self) -> tuple[Rung, bool]:
+        """Write it the best way that keeps the size; which, and whether something was given up for it."""
         rungs = ladder(self._info.width, self._info.height, self._info.fps, gif=self._gif)
-        self._given_up = False
+        given_up = False
         while True:
             rung = rungs.pop(0)
             self._encode(rung)
             size = self._target.stat().st_size
             if self._max_bytes is None or size <= self._max_bytes:
-                return rung
+                return rung, given_up
             if not rungs:
                 break
             # What is hopeless by its number of pixels is not tried, but for the last.
             hope = _HOPE * self._max_bytes / size * rung.weight
             rungs = [other for other in rungs[:-1] if other.weight <= hope] + rungs[-1:]
-            self._given_up = True
+            given_up = True
         raise OutputError(
             f"{self.path}: takes {size / 1e6:.2f} MB even at its smallest, more than the "
             f"{self._max_bytes / 1e6:g} MB allowed; show a shorter stretch (--start, --end) or allow more"
         )
 
-    def _tell(self, rung: Rung) -> None:
-        if self._given_up:
-            rate = f"{float(self._info.fps / rung.every):.4g} pictures a second"
-            level = f"{_COLOURS[rung.level]} colours" if self._gif else f"quality {_QUALITY[rung.level]}"
-            allowed = f"{(self._max_bytes or 0) / 1e6:g} MB"
-            self.warnings = (f"{self.path}: {rung.width}x{rung.height}, {rate}, {level}, to keep {allowed}",)
-
-    def _keeping(self) -> list[str]:
-        """Arguments of the ffmpeg that keeps the frames as they are."""
-        info = self._info
-        pixels = ("rgba", "bgra") if self._channels == 4 else ("rgb24", "bgr0")
-        return [
-            *("-loglevel", "error", "-f", "rawvideo", "-pix_fmt", pixels[0]),
-            *("-video_size", f"{info.width}x{info.height}", "-framerate", str(info.fps), "-i", "pipe:0"),
-            *("-c:v", "ffv1", "-level", "3", "-pix_fmt", pixels[1]),
-            *("-f", "matroska", "-y", ffmpeg.file_url(self._kept)),
-        ]
-
     def _encode(self, rung: Rung) -> None:
-        source = ["-loglevel", "error", "-i", ffmpeg.file_url(self._kept)]
         sized = f"framestep={rung.every},scale={rung.width}:{self._upright(rung)}:flags=lanczos,setsar=1"
-        target = ["-loop", "0", "-y", ffmpeg.file_url(self._target)]
-        if not self._gif:
-            quality = (
-                "-c:v",
-                "libwebp_anim",
-                "-quality",
-                str(_QUALITY[rung.level]),
-                "-compression_level",
-                "4",
-            )
-            pixels = "yuva420p" if self._channels == 4 else "yuv420p"
-            self._run([*source, "-vf", f"{sized},format={pixels}", *quality, "-f", "webp", *target])
-            return
-        clear = int(self._channels == 4)
-        count = f"max_colors={_COLOURS[rung.level]}:reserve_transparent={clear}:stats_mode=full"
-        palette = ffmpeg.file_url(self._palette)
-        self._run(
-            [*source, "-vf", f"{sized},palettegen={count}", "-f", "image2", "-update", "1", "-y", palette]
-        )
+        if self._gif:
+            self._encode_gif(sized, _COLOURS[rung.level])
+        else:
+            self._encode_webp(sized, _QUALITY[rung.level])
+
+    def _encode_gif(self, sized: str, colours: int) -> None:
+        """Choose the colours out of all pictures, then write with them.
+
+        The pattern of an ordered dither stays where it is from picture to picture; error diffusion swarms.
+        """
+        source, palette = ffmpeg.file_url(self._kept), ffmpeg.file_url(self._palette)
+        choice = f"palettegen=max_colors={colours}:reserve_transparent={int(self._transparent)}"
+        still = ("-f", "image2", "-update", "1", "-y", palette)
+        self._run(["-i", source, "-vf", f"{sized},{choice}", *still])
         use = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
         graph = f"[0:v]{sized}[pictures];[pictures][1:v]{use}"
-        self._run([*source, "-i", palette, "-lavfi", graph, "-f", "gif", *target])
+        self._run(["-i", source, "-i", palette, "-lavfi", graph, "-f", "gif", *self._for_ever()])
+
+    def _encode_webp(self, sized: str, quality: int) -> None:
+        pixels = "yuva420p" if self._transparent else "yuv420p"
+        encoder = ("-c:v", "libwebp_anim", "-quality", str(quality), "-compression_level", "4")
+        source = ("-i", ffmpeg.file_url(self._kept), "-vf", f"{sized},format={pixels}")
+        self._run([*source, *encoder, "-f", "webp", *self._for_ever()])
+
+    def _for_ever(self) -> list[str]:
+        """Arguments for the target, which begins anew when it has ended."""
+        return ["-loop", "0", "-y", ffmpeg.file_url(self._target)]
 
     def _upright(self, rung: Rung) -> int:
         """Height in square pixels, which neither format knows otherwise."""
         return max(1, round(rung.height / self._info.sample_aspect))
 
     def _run(self, arguments: list[str]) -> None:
-        status, _, complaints = ffmpeg.run(arguments)
+        status, _, complaints = ffmpeg.run(["-loglevel", "error", *arguments])
         if status != 0:
             raise self._failure(complaints)
-
-    def _failure(self, complaints: list[str]) -> OutputError:
-        if "No space left on device" in "\n".join(complaints):
-            return OutputError(f"{self.path}: the disk is full; free space or name another place")
-        reason = complaints[-1] if complaints else "it was killed"
-        return OutputError(f"{self.path}: ffmpeg could not write it ({reason}); check the disk and memory")

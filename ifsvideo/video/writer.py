@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Collection
-from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
-from ifsvideo.errors import OutputError, UsageError
+from ifsvideo.errors import UsageError
 from ifsvideo.output.atomic import Outputs, check_writable
 from ifsvideo.types import Image, VideoInfo
 from ifsvideo.video import animation, ffmpeg
+from ifsvideo.video.feeding import FedWriter
 from ifsvideo.video.probe import audio_codec, count_frames
 
 FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
@@ -63,7 +61,7 @@ def check_output(
     check_writable(path)
 
 
-class VideoWriter:
+class VideoWriter(FedWriter):
     """Writes frames to an H.264 file: yuv420p, constant rate, faststart.
 
     With transparency, which H.264 does not know, the codec is QuickTime Animation, which programs that cut
@@ -119,13 +117,8 @@ class VideoWriter:
         for_page: bool = False,
     ) -> None:
         check_output(path, endings=[".mov"] if transparent else FORMATS)
-        self.path = path
-        self.frames = 0
-        self.warnings: tuple[str, ...] = ()
-        self._info = info
+        super().__init__(path, info, outputs, transparent)
         self._audio_from = audio_from
-        self._group = outputs
-        self._transparent = transparent
         self._encoder = _ENCODER_FOR_PAGES if for_page else _ENCODER
         self._pad = (0, 0) if transparent else (info.height % 2, info.width % 2)
         if any(self._pad):
@@ -137,104 +130,29 @@ class VideoWriter:
         """Whether an odd side is padded by one pixel (a repetition of the last row or column)."""
         return any(self._pad)
 
-    def __enter__(self) -> Self:
-        self._own = Outputs()
-        self._complete = False
-        try:
-            self._target = (self._group or self._own).add(self.path)
-            # With sound, the pictures go to a file of their own first: the length is known only at the end.
-            self._pictures = self._own.add_scratch(self._target) if self._audio_from else self._target
-            self._child = ffmpeg.Ffmpeg(self._arguments(), feeds=True)
-        except BaseException:
-            self._own.discard()
-            raise
-        return self
+    def _padded(self, image: Image) -> Image:
+        if not self.padded:
+            return image
+        return np.pad(image, ((0, self._pad[0]), (0, self._pad[1]), (0, 0)), mode="edge")
 
-    def write(self, image: Image) -> None:
-        """Append one frame.
-
-        Parameters
-        ----------
-        image : (H, W, 3) uint8
-            RGB, of the size promised by ``info``; (H, W, 4) RGBA where it is transparent.
-
-        Raises
-        ------
-        ValueError
-            If shape or type differ.
-        OutputError
-            If ffmpeg has died, for instance because the disk is full.
-        """
-        expected = (self._info.height, self._info.width, 4 if self._transparent else 3)
-        if image.shape != expected or image.dtype != np.uint8:
-            raise ValueError(f"expected uint8 image of shape {expected}, got {image.dtype} {image.shape}")
-        pixels = np.ascontiguousarray(image)
-        if self.padded:
-            pixels = np.pad(image, ((0, self._pad[0]), (0, self._pad[1]), (0, 0)), mode="edge")
-        try:
-            self._child.stdin.write(pixels.data.cast("B"))
-        except OSError:
-            self._child.wait()
-            raise self._failure(self._child.printed()) from None
-        self.frames += 1
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            if kind is None:
-                self.finish()
-        except BaseException as failure:
-            kind, error, trace = type(failure), failure, failure.__traceback__
-            raise
-        finally:
-            self._child.stop()
-            self._own.__exit__(kind, error, trace)
-
-    def finish(self) -> None:
-        """Let ffmpeg end, add the sound, make sure that all is there; leaving the context well does it too.
-
-        Raises
-        ------
-        OutputError
-            If ffmpeg fails, the disk is full or no frame was written.
-        """
-        if self._complete:
-            return
-        with suppress(OSError):  # where ffmpeg has died, its exit status says more
-            self._child.stdin.close()
-        status = self._child.wait()
-        if self.frames == 0:
-            raise OutputError(f"{self.path}: no frame was written; nothing is left to place there")
-        if status != 0:
-            raise self._failure(self._child.printed())
+    def _complete(self) -> None:
+        """Add the sound, make sure that all is there."""
         if self._audio_from is not None:
             self._add_sound(self._audio_from)
         placed = count_frames(self._target)
         if placed != self.frames:  # a full disk does not always make ffmpeg fail
             raise self._failure([*self._child.printed(), f"{placed} of {self.frames} frames arrived"])
-        self._complete = True
 
     def _arguments(self) -> list[str]:
-        info = self._info
-        width, height = info.width + self._pad[1], info.height + self._pad[0]
-        filters = f"setsar=sar={info.sample_aspect}:max=65535"
-        encoder, pixels = ["-c:v", "qtrle", "-pix_fmt", "argb"], "rgba"
+        # With sound, the pictures go to a file of their own first: the length is known only at the end.
+        self._pictures = self._own.add_scratch(self._target) if self._audio_from else self._target
+        filters = f"setsar=sar={self._info.sample_aspect}:max=65535"
+        encoder = ["-c:v", "qtrle", "-pix_fmt", "argb"]
         if not self._transparent:
-            filters, encoder, pixels = f"{_COLOURS},{filters}", self._encoder, "rgb24"
+            filters, encoder = f"{_COLOURS},{filters}", self._encoder
         return [
-            *(
-                "-loglevel",
-                "error",
-                "-f",
-                "rawvideo",
-                "-pix_fmt",
-                pixels,
-                "-video_size",
-                f"{width}x{height}",
-            ),
-            *("-framerate", str(info.fps), "-i", "pipe:0", "-vf", filters),
-            *(*encoder, "-fps_mode", "passthrough"),
+            *self._input(self._info.width + self._pad[1], self._info.height + self._pad[0]),
+            *("-vf", filters, *encoder, "-fps_mode", "passthrough"),
             *self._destination(self._pictures),
         ]
 
@@ -272,15 +190,3 @@ class VideoWriter:
         if "No space left on device" in "\n".join(complaints):
             raise self._failure(complaints)
         return [] if status == 0 else complaints or [f"exit status {status}"]
-
-    def _warn(self, text: str) -> None:
-        self.warnings = (*self.warnings, f"{self.path}: {text}")
-
-    def _failure(self, complaints: list[str]) -> OutputError:
-        text = "\n".join(complaints)
-        if "No space left on device" in text:
-            return OutputError(f"{self.path}: the disk is full; free space or name another place")
-        reason = complaints[-1] if complaints else "it was killed"
-        return OutputError(
-            f"{self.path}: ffmpeg could not write the video ({reason}); check the disk and memory"
-        )
