@@ -14,6 +14,8 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
+_SCRIPT = ("data", "player", "drawing", "timeline", "table", "plots", "approach", "pairs", "main")
+"""Parts of the one script, in their order; they share their names, and the last begins everything."""
 _PLACE = re.compile(r"<!--(\w+)-->|/\*(\w+)\*/")
 
 
@@ -37,7 +39,7 @@ def fill(name: str, facts: str, data: Mapping[str, Any], video: str) -> str:
     parts = {
         "title": html.escape(name),
         "facts": html.escape(facts),
-        "script": _part("page.js"),
+        "script": "".join(_part(f"script/{name}.js") for name in _SCRIPT),
         "data": as_script(data),
         "video": player if video else "",
     }
