@@ -36,14 +36,16 @@ def label_frames(
     rate = fps or 30.0
     numbers = count(1)
     shot: Shot | None = None
+    frozen = 0
     for place, step in enumerate(steps):
         if shot is not None and step.cut:
             yield from shot.finish()
             shot = None
         if shot is None:
             shot = Shot(label, Numbers(numbers, config.least_seconds * rate), config, size, fps)
-        last = shot.last if step.repeats else None
-        if last is not None and last.shown <= config.longest_freeze_s * rate:
+        frozen = frozen + 1 if step.repeats else 0
+        last = shot.last
+        if last is not None and 0 < frozen <= config.longest_freeze_s * rate:
             last.shown += 1
         else:
             yield from shot.add(Frame(place, step.points, step.picture))

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ifsvideo.tracking.cuts import alike, tracks_end
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import Bools, FramePoints, GreyTracker, Image, Tracker
 from ifsvideo.video.picture import Picture
@@ -82,11 +83,21 @@ def follow(
             taken += 1
             if not shown:
                 break
-            last = Step(ordered(points), shown.popleft())
+            last = _step(last, ordered(points), shown.popleft())
             yield last
         if taken != given:
             raise ValueError(f"the tracker gave points for {taken} of {given} frames")
         yield from repetitions()
+
+
+def _step(before: Step | None, points: FramePoints, picture: Picture) -> Step:
+    cut = (
+        before is not None
+        and before.picture is not None
+        and tracks_end(before.points.ids, points.ids)
+        and not alike(before.picture.grey, picture.grey)
+    )
+    return Step(points, picture, cut=cut)
 
 
 def steps_of(trajectories: Trajectories) -> Iterator[Step]:
