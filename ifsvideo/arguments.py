@@ -37,12 +37,18 @@ exit status: 0 done; 1 fault of the program; 2 wrong use; 3 input cannot be read
 
 @dataclass(frozen=True)
 class Job:
-    """One input and what is written of it."""
+    """One input, the chapters that are joined to it, and what is written of it."""
 
     source: Path
     output: Path | None
     labels: Path
     products: Products
+    chapters: tuple[Path, ...] = ()
+
+    @property
+    def whole(self) -> Path | list[Path]:
+        """The input as `Pipeline.run` takes it: with the chapters that follow it, where there are any."""
+        return [self.source, *self.chapters] if self.chapters else self.source
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,7 @@ class Arguments:
     fps: Fraction | None
     start: float
     end: float | None
+    preview: int | None
     ignore: tuple[Area, ...]
     motions: int | None
     quiet: bool
@@ -80,16 +87,18 @@ def parse(argv: Sequence[str] | None = None) -> Arguments:
     told = _parser().parse_args(argv)
     config = _config(told)
     output = None if told.output is None else Path(told.output)
-    folder = _folder(told.output, told.input)
+    sources = told.input[:1] if told.join else told.input
+    folder = _folder(told.output, sources)
     ending = ".mov" if config.overlay.transparent else ".mp4"
     return Arguments(
-        jobs=_jobs(told.input, output, folder, told.labels, _products(told), ending),
+        jobs=_wanted(told, _jobs(sources, output, folder, told.labels, _products(told), ending)),
         folder=folder,
         workers=told.jobs,
         config=config,
         fps=told.fps,
         start=told.start,
         end=told.end,
+        preview=told.preview,
         ignore=tuple(told.ignore),
         motions=told.motions,
         quiet=told.quiet,
@@ -118,7 +127,11 @@ def _parser() -> argparse.ArgumentParser:
 def _add_files(parser: argparse.ArgumentParser) -> None:
     files = parser.add_argument_group("files")
     files.add_argument(
-        "input", nargs="+", type=Path, metavar="INPUT", help="video, folder of images, or tracks (.npz, .mat)"
+        "input",
+        nargs="+",
+        type=Path,
+        metavar="INPUT",
+        help="video (-: from standard input), folder of images, or tracks (.npz, .mat)",
     )
     files.add_argument(
         "-o",
@@ -127,6 +140,7 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
         help="overlay: .mp4, .mov, .mkv, .gif or .webp (default: INPUT.ifs.mp4 beside the input); or a "
         "folder: overlay, labels, report and summary of each input, and an index.html",
     )
+    files.add_argument("--no-video", action="store_true", help="labels only, no overlay")
     files.add_argument(
         "--labels", type=Path, metavar="FILE", help="label of every point (default: .csv beside the overlay)"
     )
@@ -167,6 +181,12 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
     )
     reading.add_argument("--end", type=_option(parse_time), metavar="TIME", help="stop before this time")
     reading.add_argument(
+        "--preview", type=_option(_whole), metavar="N", help="every N-th second only, for a quick look"
+    )
+    reading.add_argument(
+        "--join", action="store_true", help="the inputs are chapters of one recording, in this order"
+    )
+    reading.add_argument(
         "--ignore",
         type=_option(parse_area),
         action="append",
@@ -180,6 +200,12 @@ def _add_finding(parser: argparse.ArgumentParser) -> None:
     finding = parser.add_argument_group("finding")
     finding.add_argument(
         "--max-points", type=_option(_whole), metavar="N", help="points tracked at once (default: 1000)"
+    )
+    finding.add_argument(
+        "--scale",
+        type=_option(_number),
+        metavar="S",
+        help="track in S times the size, such as 0.5 (default: 1)",
     )
     finding.add_argument(
         "--motions",
@@ -289,6 +315,8 @@ def _config(told: argparse.Namespace) -> Config:
     config = load_config(told.config) if told.config else Config()
     if told.max_points is not None:
         config = replace(config, tracking=replace(config.tracking, max_points=told.max_points))
+    if told.scale is not None:
+        config = replace(config, tracking=replace(config.tracking, scale=told.scale))
     if told.distortion is not None:
         config = replace(config, segmentation=replace(config.segmentation, distortion=told.distortion))
     if told.seed is not None:
@@ -323,6 +351,15 @@ def _folder(output: str | None, sources: Sequence[Path]) -> Path | None:
     if like_a_file:
         raise UsageError(f"-o {output} would name one file for several inputs; name a folder: results/")
     return place
+
+
+def _wanted(told: argparse.Namespace, jobs: tuple[Job, ...]) -> tuple[Job, ...]:
+    """The jobs without what is not wanted, and with the chapters that are joined."""
+    if Path("-") in told.input and (told.output is None or len(told.input) > 1):
+        raise UsageError("standard input goes alone, and has no name; name the output (-o FILE)")
+    if told.no_video:
+        jobs = tuple(replace(job, output=None) for job in jobs)
+    return (replace(jobs[0], chapters=tuple(told.input[1:])),) if told.join else jobs
 
 
 def _jobs(

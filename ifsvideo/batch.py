@@ -64,12 +64,13 @@ def perform(job: Job, told: Arguments, progress: Progress | None = None) -> Outc
     """
     begun = time.perf_counter()
     result = Pipeline(told.config).run(
-        job.source,
+        job.whole,
         job.output,
         job.labels,
         fps=told.fps,
         start=told.start,
         end=told.end,
+        preview=told.preview,
         ignore=told.ignore,
         motions=told.motions,
         products=job.products,

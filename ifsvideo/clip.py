@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,16 @@ from ifsvideo.tracking.files import load_trajectories
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import Tracks, VideoInfo
 from ifsvideo.video import FrameSource, check_output, open_source
+from ifsvideo.video.joined import Joined, open_joined
+from ifsvideo.video.preview import Preview
+from ifsvideo.video.stream import STDIN
 
 TRACK_ENDINGS = (".npz", ".mat")
 DEFAULT_FPS = Fraction(10)
 
-Source = str | Path | FrameSource | Tracks | NDArray[Any]
-"""Path of a video, folder of images or tracks; an open source of frames; tracks (F, P, 2), NaN: not seen."""
+Source = str | Path | Sequence[str | Path] | FrameSource | Tracks | NDArray[Any]
+"""Path of a video, folder of images or tracks, ``-`` for standard input; paths of the chapters of one
+recording; an open source of frames; tracks (F, P, 2), NaN: not seen."""
 
 
 @dataclass(frozen=True)
@@ -56,16 +60,20 @@ def is_tracks_file(path: Path) -> bool:
     return path.suffix.lower() in TRACK_ENDINGS and not path.is_dir()
 
 
-def open_clip(source: Source, fps: Fraction | None, start: float, end: float | None) -> Clip:
+def open_clip(
+    source: Source, fps: Fraction | None, start: float, end: float | None, preview: int | None = None
+) -> Clip:
     """Open what was given.
 
     Parameters
     ----------
-    source : path, FrameSource, Tracks or (F, P, 2) array
+    source : path, sequence of paths, FrameSource, Tracks or (F, P, 2) array
     fps : Fraction or None
         Frames per second; None: the source's own, 10 where it has none.
     start, end : float
         Stretch of pictures that is read, seconds; tracks are taken whole.
+    preview : int or None
+        Read every so manyth second only.
 
     Raises
     ------
@@ -76,21 +84,47 @@ def open_clip(source: Source, fps: Fraction | None, start: float, end: float | N
     """
     path = Path(source) if isinstance(source, str | Path) else None
     if path is not None and not is_tracks_file(path):
-        frames = open_source(path, fps=fps, start=start, end=end)
-        return Clip(str(path), frames.info, path, frames=frames)
+        return _of_frames(open_source(path, fps=fps, start=start, end=end), path, preview)
+    if isinstance(source, list | tuple):
+        return _of_frames(_joined([Path(each) for each in source], fps, start, end), None, preview)
     name = str(path or type(source).__name__)
-    if start != 0.0 or end is not None:
-        raise UsageError(f"{name}: is taken whole; leave out start and end")
+    if start != 0.0 or end is not None or (preview is not None and not isinstance(source, FrameSource)):
+        raise UsageError(f"{name}: is taken whole; leave out start, end and preview")
     if isinstance(source, FrameSource):
         if fps is not None:
             raise UsageError(f"{name}: is open already and has its rate; leave out fps")
-        return Clip(str(source.path), source.info, source.path, frames=source)
+        return _of_frames(source, source.path, preview)
     if isinstance(source, str | Path):
         points = load_trajectories(source)
     else:
-        points = Trajectories.from_tracks(as_tracks(source))
+        points = Trajectories.from_tracks(as_tracks(cast("Tracks | NDArray[Any]", source)))
     info = _info_of(points, fps)
     return Clip(name, info, path, trajectories=replace(points, fps=float(info.fps)))
+
+
+def _of_frames(frames: FrameSource, path: Path | None, preview: int | None) -> Clip:
+    source = frames if preview is None else Preview(frames, preview)
+    return Clip(str(frames.path), source.info, None if path == STDIN else path, frames=source)
+
+
+def _joined(paths: Sequence[Path], fps: Fraction | None, start: float, end: float | None) -> Joined:
+    """The chapters of a recording.
+
+    Raises
+    ------
+    UsageError
+        If there are none, or one cannot be a chapter.
+    """
+    for path in paths:
+        if is_tracks_file(path) or path == STDIN:
+            raise UsageError(f"{path}: cannot be joined; name video files or folders of images")
+    if not paths:
+        raise UsageError("no file to join; name at least one")
+
+    def open_one(path: Path, first: float, last: float | None) -> FrameSource:
+        return open_source(path, fps=fps, start=first, end=last)
+
+    return open_joined(paths, open_one, start, end)
 
 
 def check_outputs(clip: Clip, video: Path | None, labels: Path | None, products: Products) -> None:

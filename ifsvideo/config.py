@@ -18,6 +18,9 @@ class TrackerConfig:
 
     max_points: int = 1000
     """Points alive at once; about what two cores track as fast as 1280x720 plays."""
+    scale: float = 1.0
+    """Share of the picture's size in which it is tracked, up to 1: half of it takes a quarter of the time,
+    and small things are lost. The overlay keeps the picture's size."""
     cells: int = 96
     """Cells of the grid that spreads the corners (12 x 8 on a 3:2 picture); a cell is about as large as the
     smallest object that is to be told apart."""
@@ -60,6 +63,8 @@ class TrackerConfig:
     def __post_init__(self) -> None:
         if not 1 <= self.max_points <= 30000:
             raise UsageError(f"tracking.max_points must be 1 to 30000, got {self.max_points}")
+        if not 0 < self.scale <= 1:
+            raise UsageError(f"tracking.scale must be above 0 and at most 1, got {self.scale}")
         if self.window < 5 or self.window % 2 == 0:
             raise UsageError(f"tracking.window must be odd and at least 5, got {self.window}")
         for name in ("cells", "birth_interval", "check_interval"):

@@ -118,8 +118,9 @@ def _name(job: Job) -> str:
 def _made_of(job: Job, told: Arguments) -> str:
     """A mark that differs where the input, the settings or the version do."""
     settings = asdict(told.config)
-    stretch = (told.fps, told.start, told.end, told.motions, [_mark(area) for area in told.ignore])
-    whole = [__version__, _mark(job.source), settings, stretch]
+    stretch = (told.fps, told.start, told.end, told.preview, told.motions)
+    files = [_mark(thing) for thing in (job.source, *job.chapters, *told.ignore)]
+    whole = [__version__, files, settings, stretch]
     return hashlib.sha256(json.dumps(whole, default=str, sort_keys=True).encode()).hexdigest()[:32]
 
 

@@ -87,6 +87,7 @@ class Pipeline:
         fps: Fraction | float | None = None,
         start: float = 0.0,
         end: float | None = None,
+        preview: int | None = None,
         ignore: Sequence[Area] = (),
         motions: int | None = None,
         audio: bool = True,
@@ -98,15 +99,18 @@ class Pipeline:
 
         Parameters
         ----------
-        source : path, FrameSource, Tracks or array
-            A video, a folder of images, a file of tracks (.npz, .mat), or tracks: (F, P, 2) float, pixels,
-            NaN where a point is not seen. Of tracks only labels can be written.
+        source : path, list of paths, FrameSource, Tracks or array
+            A video (``-``: from standard input), a list of the chapters of one recording, a folder of images,
+            a file of tracks (.npz, .mat), or tracks: (F, P, 2) float, pixels, NaN where a point is not seen.
+            Of tracks only labels can be written.
         output, labels : path, optional
             Overlay (.mp4, .mov, .mkv, .gif, .webp) and CSV; they appear together when all is done.
         fps : Fraction or float, optional
             Frames per second of a folder or of tracks (10 unless told), or in place of a video's own.
         start, end : float, optional
             Stretch of the input, seconds.
+        preview : int, optional
+            Read every so manyth second only, for a quick look.
         ignore : sequence of areas, optional
             What is not looked at: rectangles (x, y, width, height), mask images, (H, W) bool arrays.
         motions : int, optional
@@ -132,7 +136,7 @@ class Pipeline:
         video, csv = (Path(path) if path is not None else None for path in (output, labels))
         if motions is not None and motions < 1:
             raise UsageError(f"motions must be at least 1, got {motions}")
-        clip = open_clip(source, _exact(fps), start, end)
+        clip = open_clip(source, _exact(fps), start, end, preview)
         products = products or Products()
         if products.clips is not None and fps is not None:
             raise UsageError("clips are cut by the video's own times; leave out fps, or the clips")
@@ -157,7 +161,9 @@ class Pipeline:
                 sinks.append(overlay)
             with self._tracked(clip, mask, watch) as steps, self._segmenting(clip, motions, watch) as label:
                 size = (clip.info.width, clip.info.height)
-                frames = label_frames(steps, label, self.config.objects, size, float(clip.info.fps))
+                frames = label_frames(
+                    steps, label, self.config.objects, size, float(clip.info.fps), self.config.tracking.scale
+                )
                 self._feed(sinks, clip, watch.each("linking", frames), watch, progress)
             with watch.stage("writing"):
                 for sink in sinks:
@@ -176,8 +182,8 @@ class Pipeline:
                 kept=kept,
             )
             result = further.described(result)
-            told = {"motions": motions, "fps": fps, "start": start, "end": end, "ignore": list(ignore)}
-            further.summarise(result, {**told, "config": asdict(self.config)})
+            told = {"motions": motions, "fps": fps, "start": start, "end": end, "preview": preview}
+            further.summarise(result, {**told, "ignore": list(ignore), "config": asdict(self.config)})
         return result
 
     @contextmanager
@@ -190,7 +196,7 @@ class Pipeline:
             yield steps_of(clip.trajectories)
             return
         pictures = watch.each("reading", clip.frames.pictures())
-        steps = watch.each("tracking", follow(self.tracker, pictures, mask))
+        steps = watch.each("tracking", follow(self.tracker, pictures, mask, clip.frames.shot_frames))
         with Ahead(steps, _AHEAD, clip.frames.stop) as ahead:
             yield watch.each("waiting", ahead)
 
@@ -215,7 +221,7 @@ class Pipeline:
                 with watch.stage("segmenting"):
                     return call(tracks)
 
-            yield stack.enter_context(Caller(label)).begin
+            yield stack.enter_context(Caller(label, watch)).begin
 
     def _feed(
         self,

@@ -49,6 +49,8 @@ class VideoInfo:
         Whether the input carries sound.
     start : float
         Time of the first frame read, seconds of the input (``--start``).
+    jump : (int, int), optional
+        Where frames are left out (``--preview``): of how many, from the first on, that number is read.
     """
 
     width: int
@@ -58,6 +60,7 @@ class VideoInfo:
     sample_aspect: Fraction = Fraction(1)
     has_audio: bool = False
     start: float = 0.0
+    jump: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1:
@@ -67,6 +70,9 @@ class VideoInfo:
 
     def time_of(self, frame: int) -> float:
         """Time of a frame, seconds of the input."""
+        if self.jump is not None:
+            read, out_of = self.jump
+            frame = frame // read * out_of + frame % read
         return self.start + float(frame / self.fps)
 
 

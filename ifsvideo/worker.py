@@ -21,20 +21,40 @@ from typing import Any, Generic, Self, TypeVar
 
 from ifsvideo.ahead import POLL_S
 from ifsvideo.errors import IfsVideoError
+from ifsvideo.stopwatch import Stopwatch
 
 _Argument = TypeVar("_Argument")
 _Value = TypeVar("_Value")
 _COMMAND = "from ifsvideo.worker import serve; serve()"
 
 
-def value_of(future: Future[_Value]) -> _Value:
-    """The value of a call, once it is there; signals are heeded meanwhile.
+class Call(Generic[_Value]):
+    """A call that has begun.
 
-    A signal that another thread happens to receive does not wake one that waits without end.
+    Parameters
+    ----------
+    future : Future
+    watch : Stopwatch
+        Counts the time that is spent waiting.
     """
-    while not wait([future], POLL_S).done:
-        continue
-    return future.result()
+
+    def __init__(self, future: Future[_Value], watch: Stopwatch) -> None:
+        self._future = future
+        self._watch = watch
+
+    def done(self) -> bool:
+        """Whether the value is there."""
+        return self._future.done()
+
+    def value(self) -> _Value:
+        """The value, or what the call raised, once it is there; signals are heeded meanwhile.
+
+        A signal that another thread happens to receive does not wake one that waits without end.
+        """
+        with self._watch.stage("waiting"):
+            while not wait([self._future], POLL_S).done:
+                continue
+        return self._future.result()
 
 
 class Caller(Generic[_Argument, _Value]):
@@ -46,19 +66,22 @@ class Caller(Generic[_Argument, _Value]):
     Parameters
     ----------
     function : callable
+    watch : Stopwatch
+        Counts the time that someone waits for a call.
     """
 
-    def __init__(self, function: Callable[[_Argument], _Value]) -> None:
+    def __init__(self, function: Callable[[_Argument], _Value], watch: Stopwatch) -> None:
         self._function = function
+        self._watch = watch
         self._calls: queue.SimpleQueue[tuple[_Argument, Future[_Value]] | None] = queue.SimpleQueue()
         self._left = False
         threading.Thread(target=self._run, daemon=True).start()
 
-    def begin(self, argument: _Argument) -> Future[_Value]:
-        """Begin a call; its value, or what it raised, is there when the future is done."""
+    def begin(self, argument: _Argument) -> Call[_Value]:
+        """Begin a call, once those before are done."""
         future: Future[_Value] = Future()
         self._calls.put((argument, future))
-        return future
+        return Call(future, self._watch)
 
     def _run(self) -> None:
         while (call := self._calls.get()) is not None and not self._left:

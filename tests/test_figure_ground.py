@@ -120,7 +120,7 @@ def test_points_outside_the_outline_that_ride_along_go_to_the_ground(contrast) -
 def test_large_pictures_are_looked_at_as_the_tracker_does(monkeypatch) -> None:
     """In twice the size, above what is tracked in full, all is the same."""
     small = sliding_square().sent_home()
-    monkeypatch.setattr("ifsvideo.objects.figure_ground.LARGEST", 1.1 * np.hypot(WIDTH, HEIGHT))
+    monkeypatch.setattr("ifsvideo.tracking.tracker.LARGEST", 1.1 * np.hypot(WIDTH, HEIGHT))
     assert sliding_square(scale=2).sent_home() == small
 
 

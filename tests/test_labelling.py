@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,20 +35,26 @@ class Told:
         return Segmentation(labels, labels == 0, labels, nothing)
 
 
-def at_once(labeller: WindowLabeller):
-    """Labels a window without waiting."""
+@dataclass
+class AtOnce:
+    """Labels that are there already."""
 
-    def begin(tracks: Tracks) -> Future[np.ndarray]:
-        done: Future[np.ndarray] = Future()
-        done.set_result(labeller(tracks))
-        return done
+    labels: np.ndarray
 
-    return begin
+    def done(self) -> bool:
+        return True
+
+    def value(self) -> np.ndarray:
+        return self.labels
 
 
 def label_clip(clip: Trajectories, segmenter: Segmenter, config: ObjectsConfig) -> np.ndarray:
     """Label of every row of a clip."""
-    label = at_once(WindowLabeller(segmenter, config))
+    labeller = WindowLabeller(segmenter, config)
+
+    def label(tracks: Tracks) -> AtOnce:
+        return AtOnce(labeller(tracks))
+
     frames = list(label_frames(steps_of(clip), label, config, clip.size, clip.fps))
     assert [frame.place for frame in frames] == list(range(clip.frames))
     return np.concatenate([np.empty(0, np.int64), *(frame.labels for frame in frames)])

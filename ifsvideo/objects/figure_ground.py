@@ -22,7 +22,7 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
 from ifsvideo.tracking.appearance import grid
-from ifsvideo.tracking.tracker import LARGEST
+from ifsvideo.tracking.tracker import shrunk, tracked_size
 from ifsvideo.types import BACKGROUND, FramePoints, Image, Ints
 from ifsvideo.video.picture import Picture
 
@@ -53,13 +53,14 @@ both, so that two small ones count as nearly equal."""
 class _Seen:
     """A frame among the last few: its points, and the least misfit to either side so far."""
 
-    def __init__(self, picture: Picture, points: FramePoints, labels: Ints) -> None:
+    def __init__(self, picture: Picture, points: FramePoints, labels: Ints, scale: float) -> None:
         self.points = points
         self.moving = labels > BACKGROUND
         self.ground = labels == BACKGROUND
         self.to_object = np.full(len(labels), np.inf, np.float32)
         self.to_ground = np.full(len(labels), np.inf, np.float32)
         self._picture = picture
+        self._scale = scale
 
     @cached_property
     def looks(self) -> tuple[Image, NDArray[np.float64]]:
@@ -68,7 +69,8 @@ class _Seen:
         Made when first asked for: where nothing moves, nobody does.
         """
         grey = self._picture.grey
-        small = _as_tracked(grey)
+        height, width = grey.shape
+        small = shrunk(grey, *tracked_size(width, height, self._scale))
         scale = np.array(small.shape[::-1]) / grey.shape[::-1]
         return np.asarray(cv2.GaussianBlur(small, (0, 0), _BLUR), np.uint8), scale
 
@@ -78,6 +80,11 @@ class FigureGround:
 
     Of the frames only the last few are kept, of every observation in them the least misfit to either side,
     and of every track the sums of these.
+
+    Parameters
+    ----------
+    scale : float
+        Share of the picture's size in which it was tracked.
 
     Examples
     --------
@@ -89,7 +96,8 @@ class FigureGround:
         off = np.isin(points.ids, check.on_ground(1.65))
     """
 
-    def __init__(self) -> None:
+    def __init__(self, scale: float = 1.0) -> None:
+        self._scale = scale
         self._recent: deque[_Seen] = deque(maxlen=max(_LAGS) + 1)
         self._ids = np.empty(0, np.int64)
         self._sums = np.empty((0, 3))
@@ -107,7 +115,7 @@ class FigureGround:
         """
         if len(self._recent) == self._recent.maxlen:
             self._ids, self._sums = self._with_rows_of([self._recent[0]])
-        self._recent.append(_Seen(picture, points, labels))
+        self._recent.append(_Seen(picture, points, labels, self._scale))
         for lag in _LAGS:
             if lag < len(self._recent):
                 _compare(self._recent[-1 - lag], self._recent[-1])
@@ -167,13 +175,6 @@ def _compare(here: _Seen, there: _Seen) -> None:
     for least, place in ((here.to_object, b[moving]), (here.to_ground, with_ground)):
         misfit = np.abs(_patches(after, place[asked]) - looks).mean(axis=1)
         least[rows] = np.minimum(least[rows], misfit)
-
-
-def _as_tracked(grey: Image) -> Image:
-    """The picture in the size in which the tracker looks at it."""
-    halvings = max(0, math.ceil(math.log2(math.hypot(*grey.shape) / LARGEST)))
-    height, width = (max(1, side >> halvings) for side in grey.shape)
-    return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _patches(picture: Image, xy: NDArray[np.float64]) -> NDArray[np.float32]:

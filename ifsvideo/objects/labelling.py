@@ -17,6 +17,7 @@ def label_frames(
     config: ObjectsConfig,
     size: tuple[int, int] | None = None,
     fps: float | None = None,
+    scale: float = 1.0,
 ) -> Iterator[Frame]:
     """Yield the frames, their labels final, some time after they came: see `Shot`.
 
@@ -32,6 +33,8 @@ def label_frames(
     config : ObjectsConfig
     size : (width, height) of the picture, or None where nobody told.
     fps : float or None
+    scale : float
+        Share of the picture's size in which it was tracked.
     """
     rate = fps or 30.0
     numbers = count(1)
@@ -42,7 +45,8 @@ def label_frames(
             yield from shot.finish()
             shot = None
         if shot is None:
-            shot = Shot(label, Numbers(numbers, config.least_seconds * rate), config, size, fps)
+            following = Numbers(numbers, config.least_seconds * rate)
+            shot = Shot(label, following, config, size, fps, scale)
         frozen = frozen + 1 if step.repeats else 0
         last = shot.last
         if last is not None and 0 < frozen <= config.longest_freeze_s * rate:

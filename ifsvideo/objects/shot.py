@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,22 @@ from ifsvideo.objects.numbering import Numbers
 from ifsvideo.objects.windows import Bounds, Windows, WindowSize, gather
 from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Tracks
 from ifsvideo.video.picture import Picture
-from ifsvideo.worker import value_of
 
-WindowLabels = Callable[[Tracks], "Future[NDArray[np.int64]]"]
-"""Begins to label the tracks of a window: 0 background, 1, 2, ... moving, -1 undecided."""
+
+class Promise(Protocol):
+    """Labels of a window's tracks that are being made."""
+
+    def done(self) -> bool:
+        """Whether they are there."""
+        ...
+
+    def value(self) -> NDArray[np.int64]:
+        """The labels (P,), once they are there: 0 background, 1, 2, ... moving, -1 undecided."""
+        ...
+
+
+WindowLabels = Callable[[Tracks], Promise]
+"""Begins to label the tracks of a window."""
 
 _UNDER_WAY = 2
 """Windows that may be under way before the next frame has to wait."""
@@ -56,7 +68,7 @@ class _Window:
 
     bounds: Bounds
     tracks: Tracks
-    labels: Future[NDArray[np.int64]]
+    labels: Promise
 
 
 class Shot:
@@ -75,6 +87,8 @@ class Shot:
     config : ObjectsConfig
     size : (width, height) of the picture, or None where nobody told.
     fps : float or None
+    scale : float
+        Share of the picture's size in which it was tracked.
     """
 
     def __init__(
@@ -84,6 +98,7 @@ class Shot:
         config: ObjectsConfig,
         size: tuple[int, int] | None,
         fps: float | None,
+        scale: float = 1.0,
     ) -> None:
         self._label = label
         self._numbers = numbers
@@ -92,7 +107,7 @@ class Shot:
         self._window_size = WindowSize.at(fps, config)
         self._windows = Windows(self._window_size)
         self._fixed = CameraFixed(size, fps, config)
-        self._borders = FigureGround()
+        self._borders = FigureGround(scale)
         longest_loss = config.longest_loss_s * (fps or 30.0)
         self._linker = Linker(config.least_shared, config.least_windows, longest_loss)
         self._least_windows = config.least_windows
@@ -147,7 +162,7 @@ class Shot:
     def _take(self, window: _Window) -> Iterator[Frame]:
         """Link a window; that makes the labels of earlier frames final."""
         stride = self._window_size.stride
-        found = self._linker.link(window.tracks, value_of(window.labels), window.bounds[0], stride)
+        found = self._linker.link(window.tracks, window.labels.value(), window.bounds[0], stride)
         self._linked.append((window.bounds, window.tracks.ids, found))
         if len(self._linked) > 1:
             self._prepare((self._linked[0][0][1] + self._linked[1][0][0]) // 2)

@@ -39,7 +39,10 @@ class Step:
 
 
 def follow(
-    tracker: Tracker, pictures: Generator[Picture, None, None], ignore: Bools | None = None
+    tracker: Tracker,
+    pictures: Generator[Picture, None, None],
+    ignore: Bools | None = None,
+    shot_frames: int | None = None,
 ) -> Generator[Step, None, None]:
     """Track the frames of a clip; those that repeat the one before are not shown to the tracker.
 
@@ -51,31 +54,34 @@ def follow(
         It is closed in the end.
     ignore : (H, W) bool, optional
         True where the picture is not looked at.
+    shot_frames : int, optional
+        Where the frames do not follow each other: after so many of them another shot begins.
 
     Raises
     ------
     ValueError
         If the tracker does not give points for every frame, or two points of one track.
     """
-    shown: deque[Picture] = deque()
+    shown: deque[_Shown] = deque()
     given = taken = 0
     last: Step | None = None
 
     def distinct() -> Iterator[Picture]:
         nonlocal given
         before: Picture | None = None
-        for picture in pictures:
-            if before is not None and picture.repeats(before):
-                shown.append(before)  # the same object: so a repetition is known, and costs no memory
+        for place, picture in enumerate(pictures):
+            begins = shot_frames is not None and place % shot_frames == 0
+            if before is not None and not begins and picture.repeats(before):
+                shown.append(_Shown(before, repeats=True))
                 continue
             before = picture
             given += 1
-            shown.append(picture)
+            shown.append(_Shown(picture, begins=begins))
             yield picture
 
     def repetitions() -> Iterator[Step]:
-        while last is not None and shown and shown[0] is last.picture:
-            yield Step(last.points, shown.popleft(), repeats=True)
+        while last is not None and shown and shown[0].repeats:
+            yield Step(last.points, shown.popleft().picture, repeats=True)
 
     with closing(pictures):
         for points in _points(tracker, distinct(), ignore):
@@ -90,14 +96,23 @@ def follow(
         yield from repetitions()
 
 
-def _step(before: Step | None, points: FramePoints, picture: Picture) -> Step:
-    cut = (
+@dataclass(frozen=True)
+class _Shown:
+    """A frame that was read and has no points yet."""
+
+    picture: Picture
+    repeats: bool = False
+    begins: bool = False
+
+
+def _step(before: Step | None, points: FramePoints, shown: _Shown) -> Step:
+    cut = shown.begins or (
         before is not None
         and before.picture is not None
         and tracks_end(before.points.ids, points.ids)
-        and not alike(before.picture.grey, picture.grey)
+        and not alike(before.picture.grey, shown.picture.grey)
     )
-    return Step(points, picture, cut=cut)
+    return Step(points, shown.picture, cut=cut)
 
 
 def steps_of(trajectories: Trajectories) -> Iterator[Step]:

@@ -31,6 +31,20 @@ COLLAPSED = 0.4
 """Share of the least distance of corners below which two tracks follow the same thing."""
 
 
+def tracked_size(width: int, height: int, scale: float = 1.0) -> tuple[int, int]:
+    """Width and height in which a picture is tracked: ``scale`` times its own, halved while that is large."""
+    while math.hypot(width, height) * scale > LARGEST:
+        scale /= 2
+    return max(1, int(width * scale)), max(1, int(height * scale))
+
+
+def shrunk(grey: Image, width: int, height: int) -> Image:
+    """A grey picture in another size; itself where it has that."""
+    if grey.shape == (height, width):
+        return grey
+    return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
 class KltTracker:
     """Shi-Tomasi corners followed by pyramidal KLT; a `ifsvideo.types.Tracker`.
 
@@ -77,10 +91,7 @@ class _Life:
                 "give a mask of the frames' size"
             )
         self.config = config
-        self.shrink = 1
-        while math.hypot(width, height) / self.shrink > LARGEST:
-            self.shrink *= 2
-        self.width, self.height = max(1, width // self.shrink), max(1, height // self.shrink)
+        self.width, self.height = tracked_size(width, height, config.scale)
         self.full_size = (width, height)
         self.diagonal = math.hypot(self.width, self.height)
         self.search = Search.for_picture(self.width, self.height, config.window)
@@ -193,9 +204,7 @@ class _Life:
         width, height = self.full_size
         if grey.shape != (height, width):
             raise ValueError(f"expected frames of {width}x{height} pixels, got {grey.shape}")
-        if self.shrink == 1:
-            return grey
-        return np.asarray(cv2.resize(grey, (self.width, self.height), interpolation=cv2.INTER_AREA), np.uint8)
+        return shrunk(grey, self.width, self.height)
 
     def _in_full_size(self, xy: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pixels of the frame as it came: the centre of the top-left pixel is (0, 0) in both sizes."""

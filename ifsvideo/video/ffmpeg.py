@@ -52,14 +52,18 @@ class Ffmpeg:
         What follows ``ffmpeg -hide_banner -nostdin``.
     feeds : bool
         True if the child reads ``stdin`` from us, False if we read its ``stdout``.
+    stdin : binary file, optional
+        What the child reads where we do not feed it.
     """
 
-    def __init__(self, arguments: Sequence[str], *, feeds: bool = False) -> None:
-        command = [executable(), "-hide_banner", *([] if feeds else ["-nostdin"]), *arguments]
+    def __init__(
+        self, arguments: Sequence[str], *, feeds: bool = False, stdin: IO[bytes] | None = None
+    ) -> None:
+        command = [executable(), "-hide_banner", *([] if feeds or stdin else ["-nostdin"]), *arguments]
         # A session of its own: Ctrl-C in the terminal reaches Python alone, which decides about the child.
         self._process = subprocess.Popen(
             command,
-            stdin=subprocess.PIPE if feeds else subprocess.DEVNULL,
+            stdin=subprocess.PIPE if feeds else stdin or subprocess.DEVNULL,
             stdout=subprocess.DEVNULL if feeds else subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,

@@ -9,6 +9,7 @@ from ifsvideo.errors import UsageError
 from ifsvideo.video.file import VideoFile
 from ifsvideo.video.images import ImageFolder
 from ifsvideo.video.source import FrameSource
+from ifsvideo.video.stream import STDIN, StandardInput
 
 
 def open_source(
@@ -19,7 +20,7 @@ def open_source(
     Parameters
     ----------
     path : str or Path
-        Any file that ffmpeg decodes, or a folder of images in natural order.
+        Any file that ffmpeg decodes, a folder of images in natural order, or ``-``: standard input.
     fps : Fraction, optional
         Frames per second: of a folder (10 unless told), or in place of a file's own rate.
     start, end : float, optional
@@ -29,7 +30,7 @@ def open_source(
     Returns
     -------
     FrameSource
-        `VideoFile` or `ImageFolder`.
+        `VideoFile`, `ImageFolder` or `StandardInput`.
 
     Raises
     ------
@@ -41,5 +42,7 @@ def open_source(
     path = Path(path)
     if fps is not None and fps <= 0:
         raise UsageError(f"{path}: {fps} frames per second cannot be; give a positive number")
+    if path == STDIN:
+        return StandardInput(fps=fps, start=start, end=end)
     kind = ImageFolder if path.is_dir() else VideoFile
     return kind(path, fps=fps, start=start, end=end)

@@ -26,11 +26,14 @@ class FrameSource(ABC):
         Of the stretch that is read.
     warnings : tuple of str
         What the last full pass met: frames missing, data damaged.
+    shot_frames : int or None
+        Where the frames do not follow each other: after so many of them another shot begins.
     """
 
     path: Path
     info: VideoInfo
     warnings: tuple[str, ...] = ()
+    shot_frames: int | None = None
 
     @abstractmethod
     def frames(self) -> Generator[Image, None, None]:
