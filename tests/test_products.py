@@ -84,6 +84,12 @@ def test_tracks_are_taken_back_and_give_the_same_labels(clip, tmp_path):
     assert len(ifsvideo.segment(ifsvideo.load_tracks(tmp_path / "t.npz")).labels) > 20
 
 
+def test_names_may_be_strings(pipeline, clip, tmp_path):
+    result = pipeline.run(clip, products=Products(objects=str(tmp_path / "o.csv")))
+    assert result.further == (tmp_path / "o.csv",)
+    assert (tmp_path / "o.csv").exists()
+
+
 def test_a_failure_leaves_nothing(clip, tmp_path):
     class Broken(ByStep):
         def segment(self, tracks, motions=None):

@@ -37,7 +37,7 @@ _OUT_S = 0.7
 """An object whose middle would be out of the picture so many seconds after its last sight has left it."""
 _CONTACT_S = 3.0
 """Time to contact, seconds, under which something comes closer fast. Warnings of collision are asked for
-between 2.1 and 2.4 s before it (NHTSA, New Car Assessment Program, Forward Collision Warning, 2013); a little
+between 2.0 and 2.4 s before it (NHTSA, New Car Assessment Program, Forward Collision Warning, 2013); a little
 earlier is a good time to look."""
 _LASTING_S = 0.2
 """Seconds for which it must be so, in four of five frames."""

@@ -49,6 +49,10 @@ class Products:
     clips: Path | None = None
     report: Path | None = None
 
+    def __post_init__(self) -> None:
+        for name, path in self.named():  # a caller without a type checker may give strings
+            object.__setattr__(self, name, path)
+
     def named(self) -> Iterator[tuple[str, Path]]:
         """Name and place of what is to be written."""
         for item in fields(self):
