@@ -417,5 +417,8 @@ class Renderer(Protocol):
     """Draws what was found."""
 
     def draw(self, image: Image, scene: Scene) -> Image:
-        """Return the picture (H, W, 3) uint8 RGB to be written; ``image`` must not be changed."""
+        """Return the picture (H, W, 3) uint8 RGB to be written; ``image`` must not be changed.
+
+        Where a transparent overlay is asked for (`ifsvideo.OverlayConfig.transparent`): (H, W, 4) RGBA.
+        """
         ...

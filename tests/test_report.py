@@ -19,7 +19,7 @@ from ifsvideo.report import sink
 from ifsvideo.report.data import page_data
 from ifsvideo.report.page import as_script, beside, fill, packed
 from ifsvideo.report.pairs import Pairs
-from ifsvideo.report.shapes import DIRECTIONS, outline
+from ifsvideo.report.shapes import DIRECTIONS, outline, steady
 from ifsvideo.types import VideoInfo
 
 from .conftest import decoded
@@ -36,6 +36,16 @@ def test_outline_follows_the_points():
     assert found[2 + along] == pytest.approx(50 + margin, abs=0.5)
     assert found[2 + 2 * along] == pytest.approx(100 + margin, abs=0.5)
     assert (outline(corners[:1], 1000.0)[2:] > 8).all(), "one point has an outline too"
+
+
+def test_an_outline_that_twitches_is_steadied_as_the_object_moves_and_grows():
+    step = np.arange(12)
+    size = 100 * np.exp(0.05 * step)
+    boxes = np.stack([10.0 * step, 5.0 * step, size, size], axis=1)
+    wanted = np.column_stack([boxes[:, :2] + size[:, None] / 2, np.tile(0.6 * size[:, None], DIRECTIONS)])
+    seen = wanted.copy()
+    seen[6, 2:] *= 1.5
+    np.testing.assert_allclose(steady(seen, boxes), wanted, rtol=1e-4)
 
 
 def test_packed_numbers_are_found_again():

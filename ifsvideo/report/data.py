@@ -13,6 +13,7 @@ from ifsvideo.objects.history import ObjectHistory, ObjectTable
 from ifsvideo.output.palette import object_colour
 from ifsvideo.report.page import embedded, packed
 from ifsvideo.report.pairs import Pairs
+from ifsvideo.report.shapes import steady
 from ifsvideo.types import Floats, Image, VideoInfo
 
 MOST_ROWS = 40_000
@@ -52,6 +53,7 @@ def page_data(
     table = history.table.select(history.table.frame % every == 0)
     if len(table) != len(outlines):
         raise ValueError(f"{len(outlines)} outlines for {len(table)} rows of objects")
+    outlines = _steady_outlines(table, outlines)
     while len(table) > MOST_ROWS:
         every *= 2
         kept = table.frame % every == 0
@@ -79,6 +81,15 @@ def page_data(
             "stretch": packed(_joined([item.stretch for item in series]), "u2", 20.0),
         },
     }
+
+
+def _steady_outlines(table: ObjectTable, outlines: Floats) -> Floats:
+    found = np.empty_like(outlines)
+    boxes = np.stack([table.left, table.top, table.width, table.height], axis=1)
+    for number in table.numbers:
+        rows = table.object == number
+        found[rows] = steady(outlines[rows], boxes[rows])
+    return found
 
 
 def _columns(table: ObjectTable, every: int, grid: float) -> list[tuple[Any, ...]]:

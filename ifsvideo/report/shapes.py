@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from ifsvideo.output import hull
 from ifsvideo.types import Floats
@@ -14,6 +15,8 @@ DIRECTIONS = 24
 640x360, and a second of a clip stays small."""
 _REACH, _MARGIN = 0.045, 0.01
 """As of the outline that the overlay draws, shares of the diagonal; it is a little tighter."""
+_STEADY = 5
+"""Outlines of which the median is taken; a third of a second."""
 _ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 _UNIT = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
@@ -35,6 +38,28 @@ def outline(xy: Floats, diagonal: float) -> NDArray[np.float32]:
     polygon = hull.outlines(xy, _REACH * diagonal, _MARGIN * diagonal)[0]
     middle = _centroid(polygon)
     return np.concatenate([middle, _distances(polygon - middle)]).astype(np.float32)
+
+
+def steady(outlines: Floats, boxes: Floats) -> NDArray[np.float32]:
+    """The outlines of one object without the twitches of corners that come and go.
+
+    Parameters
+    ----------
+    outlines : (N, 2 + DIRECTIONS) float
+        As of `outline`, in the order of time.
+    boxes : (N, 4) float
+        Left, top, width and height at these times, steady already (`ifsvideo.objects.boxes`), pixels: each
+        outline is the median of those round it, moved and scaled as the box was.
+
+    Returns
+    -------
+    (N, 2 + DIRECTIONS) float32
+    """
+    scale = np.sqrt(np.maximum(boxes[:, 2] * boxes[:, 3], 1.0))[:, None]
+    middle = np.zeros_like(outlines)
+    middle[:, :2] = boxes[:, :2] + boxes[:, 2:] / 2
+    relative = median_filter((outlines - middle) / scale, size=(_STEADY, 1), mode="nearest")
+    return np.asarray(middle + relative * scale, np.float32)
 
 
 def _centroid(polygon: NDArray[np.float32]) -> NDArray[np.float64]:
