@@ -389,7 +389,7 @@ def _job(source: Path, output: Path | None, labels: Path | None, products: Produ
     if output is not None and not output.name:
         raise UsageError("-o needs the name of a file, such as out.mp4")
     if output is None:
-        output = _named(source.parent, source, ending)
+        output = _named(None, source, ending)
         if is_tracks_file(source):
             return Job(source, None, labels or output.with_suffix(".csv"), products)
     return Job(source, output, labels or output.with_suffix(".csv"), products)
@@ -397,13 +397,14 @@ def _job(source: Path, output: Path | None, labels: Path | None, products: Produ
 
 def _job_in(folder: Path, source: Path, ending: str) -> Job:
     """All that a folder of results holds of an input."""
+    if source == Path("-"):
+        raise UsageError("standard input has no name; name the output (-o FILE)")
     output = _named(folder, source, ending)
     products = Products(report=output.with_suffix(".html"), summary=output.with_suffix(".json"))
     return Job(source, None if is_tracks_file(source) else output, output.with_suffix(".csv"), products)
 
 
-def _named(folder: Path, source: Path, ending: str) -> Path:
-    """Where the overlay of an input goes, unless it is told."""
+def _named(folder: Path | None, source: Path, ending: str) -> Path:
+    """Where the overlay of an input goes, unless it is told: into the folder, or beside it."""
     place = source if source.name else source.resolve()
-    folder = place.parent if folder == source.parent else folder
-    return folder / f"{place.name if place.is_dir() else place.stem}.ifs{ending}"
+    return (folder or place.parent) / f"{place.name if place.is_dir() else place.stem}.ifs{ending}"

@@ -48,9 +48,13 @@ class Ledger:
     def complete(self, job: Job, told: Arguments) -> bool:
         """Whether the outputs of a job are there, made of the same input by the same settings and version."""
         entry = self._clips.get(_name(job), {})
-        return entry.get("made_of") == _made_of(job, told) and all(
-            (self._folder / name).is_file() for name in entry["files"]
-        )
+        if entry.get("made_of") != _made_of(job, told):
+            return False
+        wanted = {
+            path.name for path in (job.output, job.labels, *dict(job.products.named()).values()) if path
+        }
+        there = {name for name in entry["files"] if (self._folder / name).is_file()}
+        return wanted <= there == set(entry["files"])
 
     def note(self, job: Job, told: Arguments, outcome: Outcome | Exception) -> None:
         """Write down what became of a job.

@@ -12,7 +12,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -62,7 +62,8 @@ def test_one_folder_holds_everything_and_a_page_links_it(inputs, tmp_path, capsy
 
 def quick(job, told, progress=None) -> Outcome:
     """Writes all files of a job, with nothing in them."""
-    written = (job.output, job.labels, job.products.report, job.products.summary)
+    places = (job.output, job.labels, job.products.report, job.products.summary)
+    written = tuple(path for path in places if path is not None)
     for path in written:
         path.write_text("")
     return Outcome(f"{job.source}: frames per second", written, 1.0, 0, 0, None)
@@ -88,6 +89,14 @@ def test_what_is_done_and_unchanged_is_not_done_again(inputs, tmp_path, capsys, 
     assert run(inputs, "--max-points", "50") == 0
     assert all(time > after[name] for name, time in times(tmp_path / "out").items())
     assert run(inputs, "--max-points", "50", "--quiet", "--jobs", "2") == 0
+
+
+def test_what_was_left_out_is_made_later(inputs, tmp_path, monkeypatch):
+    monkeypatch.setattr(cli, "perform", quick)
+    assert run(inputs, "--no-video") == 0
+    assert not list((tmp_path / "out").glob("*.mp4"))
+    assert run(inputs) == 0
+    assert len(list((tmp_path / "out").glob("*.mp4"))) == 2
 
 
 def test_a_failed_clip_is_told_at_the_end_and_stops_no_other(inputs, tmp_path, capsys, monkeypatch):
@@ -130,6 +139,7 @@ def test_several_inputs_stay_beside_themselves_without_a_folder(inputs):
         (["a.mp4", "x/a.avi", "-o", "out/"], "two inputs would be written there"),
         (["a.mp4", "-o", "out/", "--report", "r.html"], "--labels and the like name one file"),
         (["a.mp4", "b.mp4", "-o", "c.gif"], "would name one file for several inputs"),
+        (["-", "-o", "out/"], "standard input has no name"),
         (["a.mp4", "--jobs", "0"], "--jobs: '0' is not a whole number"),
     ],
 )
@@ -281,9 +291,8 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
 
 def test_a_record_is_read_back(tmp_path):
     told = parse(["a.mp4", "-o", f"{tmp_path}/"])
-    (tmp_path / "a.ifs.csv").touch()
-    written = (tmp_path / "a.ifs.csv",)
-    Ledger(tmp_path).note(told.jobs[0], told, Outcome("", written, 1.0, 2, 3, (0.5, 1.5)))
+    outcome = replace(quick(told.jobs[0], told), objects=2)
+    Ledger(tmp_path).note(told.jobs[0], told, outcome)
     assert Ledger(tmp_path).complete(told.jobs[0], told)
     assert json.loads((tmp_path / "index.json").read_text())["clips"]["a"]["objects"] == 2
     (tmp_path / "a.ifs.csv").unlink()
