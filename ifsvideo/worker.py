@@ -180,9 +180,6 @@ def serve() -> None:
     requests = sys.stdin.buffer
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anyone prints must not get among the answers
-    import cv2  # only the child needs it here
-
-    cv2.setNumThreads(1)
     with suppress(EOFError, BrokenPipeError):
         function = pickle.load(requests)
         while True:

@@ -6,8 +6,9 @@ tracks      DIR or its subfolders hold tracks of your own, NAME.npz: xy (F, P, 2
             optional visible (F, P), labels (P,) integers: groups from 1, 0 not known; or .mat as above
 samples     DIR holds NAME.mp4 and NAME_truth.npz (masks (F, H, W) uint8: 0 background, k object k)
 
-and, with options of their own (objects --help, cost --help, static --help, marked --help),
+and, with options of their own (throughput --help, objects --help, cost --help, static --help, marked --help),
 
+throughput CLIP  how fast the whole program is beside decoding, tracking and encoding, and its memory
 objects DIR      the sample clips: boxes, times to contact and events of the objects
 cost CLIP        what the further outputs cost, beside the overlay alone
 static CLIP ...  clips in which nothing moves: how much is called moving, or not decided
@@ -67,6 +68,7 @@ from ifsvideo.benchmark import (
     samples,
     static,
     table,
+    throughput,
 )
 from ifsvideo.benchmark.comparison import Method, Trial
 from ifsvideo.benchmark.datasets import LabelledSequence
@@ -110,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     line = list(sys.argv[1:] if arguments is None else arguments)
     if line[:1] == ["learn"]:
         run, options = _learn, _learning_parser().parse_args(line[1:])
+    elif line[:1] == ["throughput"]:
+        run, options = throughput.measure, throughput.parser().parse_args(line[1:])
     elif line[:1] == ["objects"]:
         run, options = objects.measure, objects.parser().parse_args(line[1:])
     elif line[:1] == ["cost"]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Segmenter, Tracks
+from ifsvideo.types import BACKGROUND, UNDECIDED, Bools, FramePoints, Segmenter, Tracks
 
 _REACH = 35.0
 """Distance over which a short track may take an object's label, pixels of a 640x480 picture."""
@@ -145,54 +145,53 @@ def follow_neighbours(
     """
     result = np.full(tracks.points, UNDECIDED, dtype=np.int64)
     result[decided] = labels
-    short = np.setdiff1d(np.arange(tracks.points), decided)
     usable = decided[labels != UNDECIDED]
-    if not len(usable):
-        return result
-    for p in short:
-        seen = np.flatnonzero(tracks.visible[:, p])
-        if len(seen) < 2:
-            continue
-        result[p] = _vote(tracks, int(p), seen, usable, result, unit)
+    count = tracks.visible.sum(axis=0)
+    short = np.setdiff1d(np.flatnonzero(count >= 2), decided)
+    # A neighbour is who is near in the middle of the track's life.
+    middle = np.argmax(np.cumsum(tracks.visible[:, short], axis=0) > count[short] // 2, axis=0)
+    for frame in np.unique(middle).tolist():
+        near = usable[tracks.visible[frame, usable]]
+        if len(near):
+            group = short[middle == frame]
+            result[group] = _votes(tracks, group, frame, near, result, unit)
     return result
 
 
-def _vote(
+def _votes(
     tracks: Tracks,
-    p: int,
-    seen: NDArray[np.int64],
+    group: NDArray[np.int64],
+    frame: int,
     usable: NDArray[np.int64],
     labels: NDArray[np.int64],
     unit: float,
-) -> int:
-    """Label of one short track: each near neighbour votes, the more the nearer and the more alike it
-    moves."""
-    middle = seen[len(seen) // 2]
-    there = usable[tracks.visible[middle, usable]]
-    if not len(there):
-        return UNDECIDED
-    distance, index = cKDTree(tracks.xy[middle, there]).query(
-        tracks.xy[middle, p], k=min(_NEIGHBOURS, len(there))
+) -> NDArray[np.int64]:
+    """Labels (G,) of short tracks, by the tracks that are usable in a frame: each near neighbour votes, the
+    more the nearer and the more alike it moves."""
+    distance, index = cKDTree(tracks.xy[frame, usable]).query(
+        tracks.xy[frame, group], k=min(_NEIGHBOURS, len(usable))
     )
-    near = there[np.atleast_1d(index)]
-    both = tracks.visible[seen][:, near]
-    offset = np.where(both[:, :, None], tracks.xy[seen][:, near] - tracks.xy[seen, p][:, None], np.nan)
-    shared = both.sum(axis=0) >= 2
-    if not shared.any():
-        return UNDECIDED
+    distance, near = (np.reshape(one, (len(group), -1)) for one in (distance, usable[index]))
+    both = tracks.visible[:, group, None] & tracks.visible[:, near]
     # Rigid neighbours keep their offset; perspective changes it in proportion to the way.
-    slip = np.full(len(near), np.inf)
-    slip[shared] = np.linalg.norm(
-        np.nanmax(offset[:, shared], axis=0) - np.nanmin(offset[:, shared], axis=0), axis=1
-    )
-    way = np.linalg.norm(np.ptp(tracks.xy[seen, p], axis=0))
-    excess = (slip - slip.min()) / (0.4 * unit + 0.04 * way)
-    weight = np.exp(-excess) / (10 * unit + np.atleast_1d(distance))
+    slip = _extent(tracks.xy[:, near] - tracks.xy[:, group, None], both)
+    slip[both.sum(axis=0) < 2] = np.inf
+    way = _extent(tracks.xy[:, group], tracks.visible[:, group])
+    least = slip.min(axis=1, keepdims=True)
+    told = np.isfinite(least[:, 0])
+    excess = np.full_like(slip, np.inf)
+    excess[told] = (slip - least)[told] / (0.4 * unit + 0.04 * way[told, None])
+    weight = np.exp(-excess) / (10 * unit + distance)
     # An object's label is carried neither far nor to what moves otherwise: that is seldom a part of it.
-    far = (np.atleast_1d(distance) > _REACH * unit) | (excess > 1)
+    far = (distance > _REACH * unit) | (excess > 1)
     weight[(labels[near] > BACKGROUND) & far] = 0.0
-    if not weight.any():
-        return UNDECIDED
-    candidates = np.unique(labels[near])
-    support = [weight[labels[near] == c].sum() for c in candidates]
-    return int(candidates[int(np.argmax(support))])
+    candidates = np.unique(labels[usable])
+    support = np.stack([np.where(labels[near] == c, weight, 0.0).sum(axis=1) for c in candidates], axis=1)
+    return np.where(weight.any(axis=1), candidates[np.argmax(support, axis=1)], UNDECIDED)
+
+
+def _extent(xy: NDArray[np.float64], seen: Bools) -> NDArray[np.float64]:
+    """Diagonal of the box (...,) that each of the paths (F, ..., 2) fills where it is seen."""
+    low = np.where(seen[..., None], xy, np.inf).min(axis=0)
+    high = np.where(seen[..., None], xy, -np.inf).max(axis=0)
+    return np.asarray(np.linalg.norm(np.where(high >= low, high - low, 0.0), axis=-1), np.float64)
