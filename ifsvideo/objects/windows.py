@@ -180,7 +180,7 @@ def _votes(
     least = slip.min(axis=1, keepdims=True)
     told = np.isfinite(least[:, 0])
     excess = np.full_like(slip, np.inf)
-    excess[told] = (slip - least)[told] / (0.4 * unit + 0.04 * way[told, None])
+    excess[told] = (slip[told] - least[told]) / (0.4 * unit + 0.04 * way[told, None])
     weight = np.exp(-excess) / (10 * unit + distance)
     # An object's label is carried neither far nor to what moves otherwise: that is seldom a part of it.
     far = (distance > _REACH * unit) | (excess > 1)
