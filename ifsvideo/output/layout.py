@@ -42,7 +42,8 @@ class Composition:
     def __init__(self, renderer: Renderer, config: OverlayConfig, info: VideoInfo) -> None:
         self._renderer = renderer
         self._config = config
-        self._gutter = _even(_GUTTER * float(np.hypot(info.width, info.height)))
+        diagonal = float(np.hypot(info.width, info.height))
+        self._gutter = _even(_GUTTER * diagonal)
         width, height = info.width, info.height
         if config.layout == "side-by-side":
             width = 2 * width + self._gutter
@@ -50,7 +51,8 @@ class Composition:
             height = 2 * height + self._gutter
         slowed = info.fps / Fraction(config.slow).limit_denominator(1000)
         self.info = replace(info, width=width, height=height, fps=slowed)
-        self._title = Title(config.title, config.title_s, (width, height)) if config.title else None
+        size = (width, height)
+        self._title = Title(config.title, config.title_s, size, diagonal) if config.title else None
 
     def draw(self, image: Image, scene: Scene) -> Image:
         """The picture to be written: (H, W, 3) uint8 RGB, or (H, W, 4) RGBA where it is transparent."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ifsvideo.output.alpha import alone, blend
 from ifsvideo.output.legend import FONT, INK, PANEL, draw_panel, text_width, write
 from ifsvideo.types import Image
@@ -27,12 +25,13 @@ class Title:
     seconds : float
         How long it stands there, fading out; 0: to the end.
     size : (width, height)
-        Of the picture, pixels.
+        Of what is written, pixels.
+    diagonal : float
+        Of one picture in it, pixels; letters are as large beside two pictures as on one.
     """
 
-    def __init__(self, text: str, seconds: float, size: tuple[int, int]) -> None:
+    def __init__(self, text: str, seconds: float, size: tuple[int, int], diagonal: float) -> None:
         self._seconds = seconds
-        diagonal = float(np.hypot(*size))
         plate = _plate(" ".join(text.split()), round(_SIZE * diagonal), _WIDEST * size[0])
         edge = round(0.03 * diagonal)
         self._left = max(0, min(edge, size[0] - plate.shape[1]))

@@ -30,7 +30,8 @@ const choose = number => {
   };
   const range = [object.first, Math.max(object.last, object.first + 0.1)];
   growthPlot.set(series("growth", 1000, nothing.i2), range, "It is not seen for long enough to tell.");
-  contactPlot.set(series("contact", 100, nothing.u2), range, "It does not come closer beyond noise.");
+  contactPlot.set(series("contact", 100, nothing.u2), range, object.contact === null
+    ? "It does not come closer beyond noise." : `${object.contact.toFixed(1)} s, but for a moment only.`);
   if (partners.has(number)) { $("first").value = String(number); chooseFirst(); }
   draw(player.currentTime);
 };
