@@ -141,3 +141,57 @@ def test_what_fell_apart_in_a_single_window_grows_together_again() -> None:
     link(linker, {range(20): 1})
     link(linker, {A: 1, B: 2})
     assert link(linker, {range(20): 1}) == {range(20): {1}}
+
+
+def test_what_follows_its_neighbours_is_no_evidence() -> None:
+    """Tracks that a window could not decide of take the label of others, and do not pass their number on."""
+    linker = Linker(3)
+    link(linker, {A: 1, B: 2})
+    ids = np.arange(30)
+    decided = ids < 20
+    both = np.where(ids < 10, 1, 2)
+    assert linker.link(window(ids), both, decided)[20:].tolist() == [2] * 10
+    assert linker.number_of(25) == 2
+    # Now they are seen to be something else, and nothing of what was guessed is left.
+    assert set(linker.link(window(ids), np.where(ids < 20, both, 3))[20:].tolist()) == {3}
+    assert linker.number_of(25) == 3
+
+
+def gone_and_back(frames_between: int, step: float, place: float = 0.0) -> set[int]:
+    """Numbers of an object that moves on by a pixel a frame, is lost, and is found with new tracks."""
+    linker = Linker(3, longest_loss=20)
+
+    def seen(ids: range, begin: int, start: float, velocity: float) -> Tracks:
+        first = np.array(ids)[:, None] % 10 * [3.0, 1.0] + [start, 50.0]
+        xy = first + velocity * np.arange(12)[:, None, None] * [1.0, 0.0]
+        return Tracks.from_array(xy, ids=np.array(ids), size=(640, 480))
+
+    ones = np.ones(10, np.int64)
+    assert set(linker.link(seen(A, 0, 100.0, 1.0), ones).tolist()) == {1}
+    begin = 12 + frames_between
+    tracks = seen(B, begin, 100.0 + begin + place, step)
+    return set(linker.link(tracks, ones, start=begin).tolist())
+
+
+def test_what_was_hidden_for_a_moment_is_the_same() -> None:
+    assert gone_and_back(8, 1.0) == {1}
+
+
+@pytest.mark.parametrize(
+    ("frames_between", "step", "place"),
+    [(30, 1.0, 0.0), (8, -2.0, 0.0), (8, 1.0, 80.0)],
+    ids=["too long", "another motion", "another place"],
+)
+def test_what_comes_back_too_late_or_otherwise_is_another(
+    frames_between: int, step: float, place: float
+) -> None:
+    assert gone_and_back(frames_between, step, place) == {2}
+
+
+def test_an_object_in_sight_is_not_lost_though_a_window_misses_it() -> None:
+    linker = Linker(3, longest_loss=20)
+    ids = np.arange(20)
+    tracks = window(ids)
+    linker.link(tracks, np.where(ids < 10, 1, 0))
+    found = linker.link(tracks, np.where(ids < 10, 0, 1), start=4)
+    assert set(found[10:].tolist()) == {2}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from ifsvideo.objects.reappearance import Sight, match
-from ifsvideo.types import BACKGROUND, Tracks
+from ifsvideo.types import BACKGROUND, Bools, Tracks
 
 
 @dataclass
@@ -44,13 +44,17 @@ class Linker:
     least_windows: int = 2
     longest_loss: float = 0.0
     _given: dict[int, Counter[int]] = field(default_factory=dict)
+    _guessed: dict[int, Counter[int]] = field(default_factory=dict)
     _windows: Counter[int] = field(default_factory=Counter)
     _sights: dict[int, Sight] = field(default_factory=dict)
     _next: int = 1
 
     def number_of(self, track: int) -> int | None:
-        """The object of a track, None where no window called it moving; of equal numbers the older."""
-        given = self._given.get(track)
+        """The object of a track, None where no window called it moving; of equal numbers the older.
+
+        What its neighbours were counts where no window could decide.
+        """
+        given = self._given.get(track) or self._guessed.get(track)
         return min(given, key=lambda number: (-given[number], number)) if given else None
 
     def windows_of(self, number: int) -> int:
@@ -59,11 +63,19 @@ class Linker:
 
     def forget(self, alive: NDArray[np.int64]) -> None:
         """Drop what is known of all other tracks: they will not come again."""
-        for track in self._given.keys() - set(alive.tolist()):
-            del self._given[track]
+        living = set(alive.tolist())
+        for given in (self._given, self._guessed):
+            for track in given.keys() - living:
+                del given[track]
 
     def link(
-        self, tracks: Tracks, labels: NDArray[np.int64], start: int = 0, stride: int = 1
+        self,
+        tracks: Tracks,
+        labels: NDArray[np.int64],
+        decided: Bools | None = None,
+        *,
+        start: int = 0,
+        stride: int = 1,
     ) -> NDArray[np.int64]:
         """Replace the window's own labels by the clip's numbers. Labels 0 and -1 stay.
 
@@ -72,18 +84,29 @@ class Linker:
         tracks : Tracks
             Of the window.
         labels : (P,) int
+        decided : (P,) bool, optional
+            Whether the window has decided of the track; the others follow their neighbours, and are no
+            evidence of what is one object. By default it has of all.
         start : int
             Frame of the clip with which the window begins.
         stride : int
             Frames of the clip from one of the window's to the next.
         """
         here = [int(label) for label in np.unique(labels) if label > BACKGROUND]
-        numbers = np.array([self.number_of(int(i)) or 0 for i in tracks.ids], dtype=np.int64)
-        number_for = self._by_shared_tracks(here, labels, numbers)
+        known = [self.number_of(i) or 0 if i in self._given else 0 for i in tracks.ids.tolist()]
+        numbers = np.array(known, dtype=np.int64)
+        sure = np.ones(len(labels), bool) if decided is None else decided
+        number_for = self._by_shared_tracks(here, labels[sure], numbers[sure])
         sights = {label: Sight.of(tracks, labels == label, start, stride) for label in here}
         unknown = {label: sights[label] for label in here if label not in number_for}
         taken = number_for.values()
-        lost = {number: sight for number, sight in self._sights.items() if number not in taken}
+        lost = {
+            number: replace(
+                sight, last=max(sight.last, self._last_seen(tracks, numbers == number, start, stride))
+            )
+            for number, sight in self._sights.items()
+            if number not in taken
+        }
         unit = float(np.hypot(*tracks.size)) / 800 if tracks.size else 1.0
         number_for |= match(lost, unknown, self.longest_loss, unit)
         linked = labels.astype(np.int64)
@@ -95,13 +118,18 @@ class Linker:
             members = np.flatnonzero(labels == label)
             linked[members] = number_for[label]
             self._keep_apart(linked, members, numbers[members], place)
-        for i, number in zip(tracks.ids.tolist(), linked.tolist(), strict=True):
-            if number > BACKGROUND:
-                self._given.setdefault(i, Counter())[number] += 1
+        for k in np.flatnonzero(linked > BACKGROUND).tolist():
+            evidence = self._given if sure[k] else self._guessed
+            evidence.setdefault(int(tracks.ids[k]), Counter())[int(linked[k])] += 1
         self._windows.update(np.unique(linked[linked > BACKGROUND]).tolist())
-        self._sights |= {number_for[label]: sight for label, sight in sights.items()}
+        self._sights |= lost | {number_for[label]: sight for label, sight in sights.items()}
         self._sights = {n: s for n, s in self._sights.items() if start - s.last <= self.longest_loss}
         return linked
+
+    def _last_seen(self, tracks: Tracks, own: Bools, start: int, stride: int) -> float:
+        """Last frame in which an object's tracks are seen in a window, though it may not find the object."""
+        seen = np.flatnonzero(tracks.visible[:, own].sum(axis=1) >= self.least_shared)
+        return float(start + stride * seen[-1]) if len(seen) else -np.inf
 
     def _by_shared_tracks(
         self, here: list[int], labels: NDArray[np.int64], numbers: NDArray[np.int64]

@@ -86,7 +86,7 @@ def match(
 def _distance(lost: Sight, found: Sight, longest: float, unit: float) -> float:
     """How far the one is from where the other should be, pixels."""
     gone = found.middle - lost.middle
-    if gone <= 0 or found.first - lost.last > longest:
+    if found.middle <= lost.last or found.first - lost.last > longest:
         return _NEVER
     velocity = (lost.velocity + found.velocity) / 2
     distance = float(np.linalg.norm(lost.place + gone * velocity - found.place))

@@ -15,7 +15,7 @@ from ifsvideo.objects.camera_fixed import CameraFixed
 from ifsvideo.objects.figure_ground import FigureGround
 from ifsvideo.objects.linking import Linker
 from ifsvideo.objects.numbering import Numbers
-from ifsvideo.objects.windows import Bounds, Windows, WindowSize, gather
+from ifsvideo.objects.windows import Bounds, Windows, WindowSize, gather, long_enough
 from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Tracks
 from ifsvideo.video.picture import Picture
 
@@ -162,7 +162,10 @@ class Shot:
     def _take(self, window: _Window) -> Iterator[Frame]:
         """Link a window; that makes the labels of earlier frames final."""
         stride = self._window_size.stride
-        found = self._linker.link(window.tracks, window.labels.value(), window.bounds[0], stride)
+        decided = long_enough(window.tracks, self._config)
+        found = self._linker.link(
+            window.tracks, window.labels.value(), decided, start=window.bounds[0], stride=stride
+        )
         self._linked.append((window.bounds, window.tracks.ids, found))
         if len(self._linked) > 1:
             self._prepare((self._linked[0][0][1] + self._linked[1][0][0]) // 2)

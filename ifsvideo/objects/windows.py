@@ -99,6 +99,12 @@ def gather(
     return Tracks(xy, visible, ids.astype(np.int64), size, fps)
 
 
+def long_enough(tracks: Tracks, config: ObjectsConfig) -> Bools:
+    """Which tracks (P,) of a window last long enough to be segmented."""
+    least = max(2, config.least_life * tracks.frames)
+    return np.asarray(tracks.visible.sum(axis=0) >= least, bool)
+
+
 @dataclass(frozen=True)
 class WindowLabeller:
     """Labels all tracks of a window: those that last are segmented, the others follow their neighbours.
@@ -117,8 +123,7 @@ class WindowLabeller:
 
     def __call__(self, tracks: Tracks) -> NDArray[np.int64]:
         """Labels (P,): 0 background, 1, 2, ... moving, -1 undecided."""
-        least = max(2, self.config.least_life * tracks.frames)
-        lasting = np.flatnonzero(tracks.visible.sum(axis=0) >= least)
+        lasting = np.flatnonzero(long_enough(tracks, self.config))
         if not len(lasting):
             return np.full(tracks.points, UNDECIDED, dtype=np.int64)
         labels = self.segmenter.segment(tracks.select(lasting), self.motions).labels
