@@ -9,7 +9,7 @@ import numpy as np
 from ifsvideo.types import BACKGROUND, Counts, Image, Ints, LabelTable, MovingObject, Scene
 
 _GONE = 300
-"""Frames after which a track that is not seen is not seen again."""
+"""Frames after which a track that is not seen is taken not to be seen again."""
 
 
 class Census:
@@ -21,22 +21,21 @@ class Census:
         self._frames = 0
         self._tracks = 0
         self._rows = np.zeros(3, np.int64)
-        self._seen: dict[tuple[int, int], int] = {}
-        """Last frame of every pair of a track and its label, 0 for all tracks."""
+        self._seen: dict[int, tuple[Ints, Ints]] = {}
+        """Tracks of every label, 0 for all: those seen of late, and those seen in the time before that."""
         self._objects: dict[int, MovingObject] = {}
 
     def add(self, scene: Scene, image: Image | None) -> None:
         """See `ifsvideo.types.Sink`."""
         self._frames = scene.frame + 1
         self._rows += np.bincount(np.sign(scene.labels) + 1, minlength=3)
-        self._tracks += self._new(scene.frame, scene.ids, 0)
+        self._tracks += self._new(scene.ids, 0)
         for label in np.unique(scene.labels[scene.labels > BACKGROUND]).tolist():
-            tracks = self._new(scene.frame, scene.ids[scene.labels == label], label)
+            tracks = self._new(scene.ids[scene.labels == label], label)
             before = self._objects.get(label, MovingObject(label, scene.time_s, scene.time_s, 0))
             self._objects[label] = MovingObject(label, before.first_s, scene.time_s, before.tracks + tracks)
         if scene.frame % _GONE == 0:
-            since = scene.frame - _GONE
-            self._seen = {pair: last for pair, last in self._seen.items() if last >= since}
+            self._seen = {label: (late[:0], late) for label, (late, _) in self._seen.items() if len(late)}
 
     def finish(self) -> None:
         """See `ifsvideo.types.Sink`."""
@@ -52,12 +51,11 @@ class Census:
         undecided, background, moving = self._rows.tolist()
         return Counts(self._frames, self._tracks, background, moving, undecided)
 
-    def _new(self, frame: int, ids: Ints, label: int) -> int:
+    def _new(self, ids: Ints, label: int) -> int:
         """How many of these tracks have not been seen so far."""
-        pairs = [(track, label) for track in ids.tolist()]
-        new = sum(pair not in self._seen for pair in pairs)
-        self._seen.update(dict.fromkeys(pairs, frame))
-        return new
+        late, before = self._seen.get(label, (ids[:0], ids[:0]))
+        self._seen[label] = (np.union1d(late, ids), before)
+        return len(ids) - int(np.count_nonzero(np.isin(ids, late) | np.isin(ids, before)))
 
 
 class TableSink:
