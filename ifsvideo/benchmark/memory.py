@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 _EVERY_S = 0.2
 _KB = 1 / 1024
+_ENDING = 0.97
+"""Share of the whole from which on processes end, and their memory goes."""
 
 
 class MemoryWatch:
@@ -40,7 +42,8 @@ class MemoryWatch:
     def slope(self, from_share: float) -> float | None:
         """Growth, MB per second, over the time from a share of the whole on; None where that is too short."""
         time_s, megabytes = self._curve()
-        late = time_s >= from_share * time_s.max(initial=0.0)
+        share = time_s / max(time_s.max(initial=0.0), 1e-9)
+        late = (share >= from_share) & (share <= _ENDING)
         if np.count_nonzero(late) < 10:
             return None
         return float(np.polyfit(time_s[late], megabytes[late], 1)[0])
