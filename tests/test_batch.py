@@ -283,10 +283,10 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
         process.kill()
         process.communicate(timeout=60)
     deadline = time.monotonic() + 30
-    while children_naming(str(tmp_path)):
+    # A worker's own command line does not name the clip: it is done when its files are gone.
+    while children_naming(str(tmp_path)) or list((tmp_path / "out").iterdir()):
         assert time.monotonic() < deadline
         time.sleep(0.05)
-    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_a_record_is_read_back(tmp_path):
