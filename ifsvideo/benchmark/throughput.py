@@ -37,7 +37,8 @@ else. Ratio: how many times longer the program takes. Each runs in a process of 
 before its time begins. Without video: the same, nothing encoded.
 Stages: seconds of the program's median run; they run side by side, so that their sum is more than the whole.
 Peak: resident memory of all processes of the program together (pages that they share count for each),
-sampled five times a second. Slope: its growth after the first minute of the clip, per minute of the clip; none of a shorter clip.
+sampled five times a second. Slope: its growth after the first minute of the clip, per minute of the clip;
+none of a shorter clip.
 """
 _STRETCH_S = 10.0
 """How much of a clip is looped, seconds: ffmpeg holds it in memory to turn it round."""
