@@ -234,6 +234,15 @@ def test_a_killed_worker_fails_its_clip_with_a_reason():
     assert "a worker was killed" in str(failure)
 
 
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C raises, also where whoever started the tests ignores it, as a shell does in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_workers_that_are_stopped_clean_up(tmp_path):
     with closing(each_done(jobs(4), Waiting(tmp_path), local_executor(2), 2)) as outcomes:
         stopper = ThreadPoolExecutor(1).submit(stop_when_begun, tmp_path)
