@@ -34,30 +34,32 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
     offset = np.nanmean(tracks.xy, axis=(0, 1)) if centred else np.zeros(2)
     W = np.nan_to_num((tracks.xy - offset).transpose(0, 2, 1).reshape(2 * tracks.frames, tracks.points))
     frames = tracks.visible.sum(axis=0)
-    result = np.empty((len(models), tracks.points))
-    for m, inlier in enumerate(models.inliers):
-        mean, U = _subspace(W[:, inlier], seen[:, inlier], centred)
-        D = (W - mean[:, None]) * seen
-        # Normal equations of the projection on the visible rows, a 2x2 system for every point.
-        uu = np.einsum("ra,rb,rp->pab", U, U, seen) + 1e-9 * np.eye(2)
-        a = np.linalg.solve(uu, (U.T @ D).T[:, :, None])[:, :, 0]
-        # Not |D|^2 - a U^T D: with trajectories of 1e4 px, 1e-9 on the diagonal would show in the difference.
-        square = ((D - U @ a.T * seen) ** 2).sum(axis=0)
-        result[m] = np.sqrt(square / np.maximum(frames, 1))
+    spaces = [_subspace(W[:, inlier], seen[:, inlier], centred) for inlier in models.inliers]
+    if not spaces:
+        return np.empty((0, tracks.points))
+    mean, u, v = (np.stack([space[k] for space in spaces]) for k in range(3))  # (M, 2F) each
+    # With D = (W - mean) where seen, all sums over frames are products of matrices (M, 2F) (2F, P).
+    square = (W**2).sum(axis=0) - 2 * mean @ W + mean**2 @ seen
+    du, dv = (axis @ W - (axis * mean) @ seen for axis in (u, v))
+    uu, uv, vv = ((one * other) @ seen for one, other in ((u, u), (u, v), (v, v)))
+    # The projection's coordinates, from the normal equations on the visible rows.
+    determinant = np.maximum(uu * vv - uv**2, 1e-9)
+    a, b = (vv * du - uv * dv) / determinant, (uu * dv - uv * du) / determinant
+    # Exact to the second order in the error of a and b, where |D|^2 - a U^T D is to the first.
+    square += a * (a * uu + 2 * b * uv - 2 * du) + b * (b * vv - 2 * dv)
+    result = np.sqrt(np.maximum(square, 0.0) / np.maximum(frames, 1))
     result[:, frames < 2] = np.inf
-    return result
+    return np.asarray(result)
 
 
 def _subspace(
     W: NDArray[np.float64], seen: NDArray[np.float64], centred: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean trajectory (2F,) and two left singular vectors (2F, 2); missing entries filled along the mean."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean trajectory and two left singular vectors, (2F,) each; missing entries filled along the mean."""
     W = along_mean_path(W, seen)
     mean = W.mean(axis=1) if centred else np.zeros(len(W))
-    U = np.linalg.svd(W - mean[:, None], full_matrices=False)[0][:, :2]
-    if U.shape[1] < 2:
-        U = np.hstack([U, np.zeros((len(W), 2 - U.shape[1]))])
-    return mean, U
+    U = np.linalg.svd(W - mean[:, None], full_matrices=False)[0]
+    return mean, U[:, 0], U[:, 1] if U.shape[1] > 1 else np.zeros(len(W))
 
 
 def assign(

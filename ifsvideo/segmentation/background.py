@@ -55,7 +55,7 @@ def merge_and_label(
             parts = [_measured(merging, piece, reliable) for piece in pieces]
         for part in parts:
             apart, count = merging.apart(part, still), len(part.members)
-            few = count < config.least_points or apart < expit(config.few_points_doubt / count)
+            few = count < config.least_points or apart < expit(config.few_points_doubt / count**2)
             if motions is None and few:
                 confidence[part.members] = 1 - apart
             else:

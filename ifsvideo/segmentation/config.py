@@ -76,9 +76,10 @@ class SegmenterConfig:
     likely moving as not."""
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
-    few_points_doubt: float = 25.0
-    """Log odds by which a group must be another motion than the background, over the number of its points:
-    five are believed at 150 to 1, fifty at 2 to 1. What slips along an edge is seldom more than a handful."""
+    few_points_doubt: float = 250.0
+    """Log odds by which a group must be another motion than the background, over the square of the number of
+    its points: five must be all but certain, ten are believed at 12 to 1, twenty at 2 to 1. What slips along
+    an edge is seldom more than a handful."""
     gap: float = 50.0
     """Distance at which what moves alike is several things, pixels: no part of a car is so far from the next.
     Faults of tracking are spread over the picture, and each is then judged by itself."""
