@@ -56,6 +56,12 @@ class SegmenterConfig:
     attribute_data: bool = False
     """Whether a point refuses every model of the other attribute (eq. 3.5). Points on a boundary suffer from
     it when the split of stage 1 is wrong, so the default leaves the choice to the residual."""
+    moving_weight: float = 0.5
+    """Cost of a model whose inliers surely move to a point that surely does not, pixels: the softer form of
+    the same."""
+    label_cost: float = 4.0
+    """What a model costs, pixels: one is kept if it explains forty points better by a tenth of a pixel, or
+    four by one (`ifsvideo.segmentation.selection`). 0 keeps all, as the thesis does."""
     outlier_cost: float = 3.0
     """sigma_out: what a point pays that no model explains, pixels."""
     motion_sigma: float = 5.0
@@ -126,5 +132,6 @@ class SegmenterConfig:
             through_centre=False,
             centred=False,
             attribute_data=True,
+            label_cost=0.0,
             merging="shear",
         )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.segmentation import shear
 from ifsvideo.segmentation.lowrank import Subspace, trajectory_matrix
+from ifsvideo.segmentation.refinement import delaunay_edges
 from ifsvideo.types import Tracks
 
 Array = NDArray[np.float64]
@@ -30,6 +31,8 @@ larger, smaller : their numbers of points
 
 _MOST = 60
 """Points by which a segment is measured; more tell nothing new."""
+_KEY_FRAMES = 12
+"""Frames in which subspaces are fitted: a motion is smooth, and more would cost time and tell little."""
 _LEAST_FOR_NOISE = 6
 """Points that a segment needs to tell how noisy tracks are; fewer fit any subspace."""
 _LEAST_NOISE = 0.05
@@ -76,8 +79,11 @@ class Cues:
 
     def __init__(self, tracks: Tracks, anchor: Array, evidence: Array, unit: float, pairs: int) -> None:
         self.tracks, self.anchor, self.evidence, self.unit, self.pairs = tracks, anchor, evidence, unit, pairs
-        self.W, self.seen = trajectory_matrix(tracks)
+        self.W, self.seen = trajectory_matrix(tracks, _KEY_FRAMES)
         self.noise = self.typical_inside = 0.0
+        # Edges with both ends in a group are inside it.
+        self._graph = delaunay_edges(anchor)
+        self._graph_sum, self._graph_seen = shear.totals(tracks, self._graph)
 
     def groups(self, segments: list[tuple[Members, Members]]) -> list[Group]:
         """Groups of the segments that a window starts with: (members, reliable) each."""
@@ -93,10 +99,16 @@ class Cues:
         sample = reliable[:: 1 + (len(reliable) - 1) // _MOST]
         W, seen = self.W[:, sample], self.seen[:, sample]
         rigid, affine = (Subspace.fit(W, seen, rank).distance(self.W, self.seen) for rank in (3, 2))
-        inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
-        return Group(
-            members, reliable, sample, float(np.median(self.evidence[reliable])), inside, rigid, affine
-        )
+        evidence = float(np.median(self.evidence[reliable]))
+        return Group(members, reliable, sample, evidence, self._inside(reliable), rigid, affine)
+
+    def _inside(self, members: Members) -> float:
+        """Shear and stretch of the edges inside a group, NaN where none was seen."""
+        own = np.zeros(len(self.anchor), dtype=bool)
+        own[members] = True
+        edges = own[self._graph].all(axis=1)
+        seen = self._graph_seen[edges].sum()
+        return float(self._graph_sum[edges].sum() / seen) if seen else float("nan")
 
     def merge(self, a: Group, b: Group) -> Group:
         """Both as one."""
@@ -113,11 +125,10 @@ class Cues:
 
     def _shears(self, edges: list[Members]) -> Array:
         """Shear and stretch between the groups of each pair, the typical one where no edge was ever seen."""
-        sheared, stretched = shear.shear_and_stretch(self.tracks, np.concatenate(edges))
-        both = sheared + stretched
         first = np.cumsum([0, *map(len, edges[:-1])])
-        seen = np.add.reduceat(np.isfinite(both).sum(axis=0), first)
-        total = np.add.reduceat(np.nansum(both, axis=0), first)
+        total, seen = (
+            np.add.reduceat(part, first) for part in shear.totals(self.tracks, np.concatenate(edges))
+        )
         return np.where(seen > 0, total / np.maximum(seen, 1), self.typical_inside)
 
     def _gaps(self, edges: list[Members]) -> Array:

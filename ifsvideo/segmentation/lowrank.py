@@ -7,16 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.segmentation.key_frames import key_frames
 from ifsvideo.types import Tracks
 
 Array = NDArray[np.float64]
 
 
-def trajectory_matrix(tracks: Tracks) -> tuple[Array, Array]:
-    """W (2F, P), centred, zero where a point is not seen, and its mask (2F, P) of ones and zeros."""
-    centre = np.nanmean(tracks.xy, axis=(0, 1))
-    W = np.nan_to_num((tracks.xy - centre).transpose(0, 2, 1).reshape(2 * tracks.frames, tracks.points))
-    return W, np.repeat(tracks.visible, 2, axis=0).astype(np.float64)
+def trajectory_matrix(tracks: Tracks, most_frames: int) -> tuple[Array, Array]:
+    """W (2F, P) of at most so many key frames, centred, zero where a point is not seen, and its mask (2F, P)
+    of ones and zeros."""
+    frames = key_frames(tracks.frames, most_frames)
+    xy = tracks.xy[frames] - np.nanmean(tracks.xy, axis=(0, 1))
+    W = np.nan_to_num(xy.transpose(0, 2, 1).reshape(2 * len(frames), tracks.points))
+    return W, np.repeat(tracks.visible[frames], 2, axis=0).astype(np.float64)
 
 
 @dataclass(frozen=True)

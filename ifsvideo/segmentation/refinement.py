@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 from ifsvideo.segmentation import trws
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.sampling import AffineModels
-from ifsvideo.types import Bools, Tracks
+from ifsvideo.types import Tracks
 
 
 def delaunay_edges(xy: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -56,29 +56,30 @@ def similarity(tracks: Tracks, edges: NDArray[np.int64], unit: float, sigma: flo
 def data_term(
     residual: NDArray[np.float64],
     models: AffineModels,
-    background: Bools,
+    moving: NDArray[np.float64],
     unit: float,
     config: SegmenterConfig,
 ) -> NDArray[np.float64]:
     """Cost D of every model at every point (thesis eq. 3.5), (P, M), pixels.
 
-    The residual where the attribute of point and model agree, else the constant sigma_out. The residual is
-    cut at sigma_out too: a point that no model explains must not pay more for one it resembles than for one
-    it does not.
+    The residual where the attribute of point and model agree, else the constant sigma_out; or, softer, the
+    residual and a share of how far the point is from the model's inliers in its probability of moving. The
+    residual is cut at sigma_out: a point that no model explains must not pay more for one it resembles than
+    for one it does not.
     """
     cost = np.minimum(residual.T / unit, config.outlier_cost)
     if config.attribute_data:
-        cost = np.where(background[:, None] == ~models.foreground[None, :], cost, config.outlier_cost)
-    return cost
+        return np.where((moving[:, None] > 0.5) == models.foreground, cost, config.outlier_cost)
+    typical = models.inliers @ moving / np.maximum(models.inliers.sum(axis=1), 1)
+    return np.asarray(cost + config.moving_weight * np.abs(moving[:, None] - typical))
 
 
 def refine(
     tracks: Tracks,
     models: AffineModels,
-    residual: NDArray[np.float64],
+    cost: NDArray[np.float64],
     start: NDArray[np.int64],
-    background: Bools,
-    anchor: NDArray[np.float64],
+    edges: NDArray[np.int64],
     unit: float,
     config: SegmenterConfig,
 ) -> tuple[NDArray[np.int64], trws.Solution]:
@@ -86,10 +87,14 @@ def refine(
 
     Parameters
     ----------
+    models : AffineModels
+        The M models among which points choose.
+    cost : (P, M) float
+        The data term, pixels.
     start : (P,) int
-        Labels of stage 3: where the solver starts looking.
-    anchor : (P, 2) float
-        Where the graph's nodes lie, pixels.
+        Labels of stage 3, which compete with what the solver finds.
+    edges : (E, 2) int
+        The graph of the points.
 
     Returns
     -------
@@ -98,11 +103,10 @@ def refine(
     solution : trws.Solution
         Energy and lower bound of each iteration.
     """
-    edges = delaunay_edges(anchor)
     # eq. 3.4 sums over p and over N(p), so every edge counts twice.
     weights = 2 * config.motion_weight * similarity(tracks, edges, unit, config.motion_sigma)
     solution = trws.solve(
-        config.data_weight * data_term(residual, models, background, unit, config),
+        config.data_weight * cost,
         edges,
         weights,
         np.full(len(edges), 2 * config.attribute_weight * config.attribute_cost),

@@ -36,6 +36,10 @@ class AffineModels:
     def __len__(self) -> int:
         return len(self.foreground)
 
+    def select(self, models: NDArray[np.int64]) -> AffineModels:
+        """Some of the models."""
+        return AffineModels(self.inliers[models], self.controls[models], self.foreground[models])
+
 
 def sample_models(
     tracks: Tracks,

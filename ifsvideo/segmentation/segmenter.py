@@ -16,8 +16,9 @@ from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import Cues
 from ifsvideo.segmentation.epipolar import epipolar_support
 from ifsvideo.segmentation.merging import merge_by_shear
-from ifsvideo.segmentation.refinement import refine
+from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
+from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
 from ifsvideo.segmentation.world import static_evidence
 from ifsvideo.types import UNDECIDED, Segmentation, Tracks
@@ -80,11 +81,17 @@ class IFSSegmenter:
         background = support >= 0.5
         # 2. and 3. Affine motion models in small disks; every point to one of the nearest that explain it.
         models = sample_models(tracks, background, base, unit, config, rng)
+        graph = delaunay_edges(anchor)
         if len(models):
             residual = residuals(tracks, models, config.centred)
+            cost = data_term(residual, models, 1 - support, unit, config)
             start = assign(tracks, models, residual, base, config.nearest_models)
+            if config.label_cost:
+                kept = needed_models(cost, config.label_cost)
+                models, residual, cost = models.select(kept), residual[kept], cost[:, kept]
+                start = cost.argmin(axis=1)
             # 4. Segments with clean borders, more of them than motions.
-            chosen, solution = refine(tracks, models, residual, start, background, anchor, unit, config)
+            chosen, solution = refine(tracks, models, cost, start, graph, unit, config)
             fit = residual[chosen, np.arange(tracks.points)] / unit
             details |= {"models": models, "start": start, "solution": solution}
         else:

@@ -33,13 +33,20 @@ def shear_and_stretch(
     return shear, np.abs(np.diff(length, axis=0))
 
 
+def totals(tracks: Tracks, edges: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Shear plus stretch of each edge (E,), summed over the frames in which it was seen, and their number
+    (E,)."""
+    both = np.add(*shear_and_stretch(tracks, edges))
+    seen = np.isfinite(both)
+    return np.where(seen, both, 0.0).sum(axis=0), seen.sum(axis=0)
+
+
 def score(tracks: Tracks, edges: NDArray[np.int64]) -> float:
     """Mean over edges and frames of shear plus stretch (Algorithm 2); NaN where no edge was ever measured."""
     if not len(edges):
         return float("nan")
-    shear, stretch = shear_and_stretch(tracks, edges)
-    total = shear + stretch
-    return float(np.nanmean(total)) if np.isfinite(total).any() else float("nan")
+    total, seen = totals(tracks, edges)
+    return float(total.sum() / seen.sum()) if seen.any() else float("nan")
 
 
 def inside_edges(anchor: NDArray[np.float64], members: NDArray[np.int64]) -> NDArray[np.int64]:

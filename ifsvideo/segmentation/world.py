@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.segmentation.bundle import Bundle, Estimate
+from ifsvideo.segmentation.key_frames import key_frames
 from ifsvideo.types import Bools, Tracks
 
 Array = NDArray[np.float64]
@@ -32,16 +33,20 @@ LENS_PRIOR = np.array([np.log(0.8), 0.0])
 """Focal length in longer sides (dashcams 0.6 to 0.8, phones 0.8 to 1), no distortion."""
 LENS_SPREAD = np.array([0.3, 0.15])
 """How far the lens is off, each worth one badly fitting point per standard deviation."""
-STARTS = ((0, 0, -1), (1, 0, 0), (0.7, 0, -0.7), (-0.7, 0, -0.7), (0, 1, 0), (0, 0.7, -0.7), (0, -0.7, -0.7))
-"""Directions of the camera's motion from which the fit starts: ahead, aside, half of each; their negatives
-come out of the sign of the first depths."""
-START_POINTS = 150
+STARTS = ((0, 0, -1), (1, 0, 0), (0.7, 0, -0.7), (-0.7, 0, -0.7), (0, 1, 0))
+"""Directions of the camera's motion from which the fit starts: ahead, aside, half of each, up; their
+negatives come out of the sign of the first depths."""
+START_POINTS = 100
 """Points of the starts, thinned so that no corner of the picture has its way."""
 PARALLAX_SHARE = 0.2
 """A camera has moved, not only turned, if the points that need it to have moved weigh at least so many times
 those that do not: depth shows in many places, a thing that moves in one. More finds larger things before a
 standing camera, and takes more of a scene with little parallax for movers."""
-FALLING = [16.0, 8.0, 8.0, 4.0, 4.0, 2.0, 2.0, 1.0]
+FINALISTS, FINAL_STEPS = 2, 7
+"""Starts that are followed to their end, and the steps of each; more found nothing better."""
+LAST_STEPS = 3
+"""Steps with all points, from what the few of the starts found."""
+FALLING = [16.0, 8.0, 4.0, 2.0, 1.4, 1.0]
 """Widths of the robust cost during a start: first everything counts, at last only what fits."""
 
 
@@ -101,9 +106,7 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     World or None
         None where fewer than 8 points are seen in two key frames: nothing can be said.
     """
-    frames = np.unique(
-        np.round(np.linspace(0, tracks.frames - 1, min(KEY_FRAMES, tracks.frames))).astype(int)
-    )
+    frames = key_frames(tracks.frames, KEY_FRAMES)
     seen = tracks.visible[frames]
     good = seen.sum(axis=0) >= 2
     if good.sum() < 8:
@@ -127,15 +130,16 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     picked = _thin(seen, cell, good, rng)
     time = (frames - frames[reference]) / max(frames[-1] - frames[0], 1)
     X = np.column_stack([place / np.exp(LENS_PRIOR[0]), np.zeros(tracks.points)])
-    start, turned = _best_start(bundle.subset(picked), X[picked], time)
-    far = _all_far(bundle, turned, X)
+    few = bundle.subset(picked)
+    start, turned = _best_start(few, X[picked], time)
+    far = _all_far(few, turned, X[picked])
+    moved = _has_moved(few, start, far)
+    start = start if moved else far
     X[:, :2] *= np.exp(LENS_PRIOR[0] - start.log_focal)
     X[:, 2] = np.median(start.X[:, 2])
     X[picked] = start.X
     estimate = bundle.solve_points(replace(start, X=X), 6)
-    estimate = bundle.solve_points(bundle.solve(estimate, [1.0] * 6), 3)
-    if not _has_moved(bundle, estimate, far):
-        estimate = far
+    estimate = bundle.solve_points(bundle.solve(estimate, [1.0] * LAST_STEPS, translate=moved), 3)
     return World(
         frames,
         reference,
@@ -192,7 +196,7 @@ def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estima
         estimate = bundle.solve(replace(turned, t=t, X=near), FALLING)
         found.append((bundle.cost(bundle.residual(estimate), 1.0), len(found), estimate))
     finished = []
-    for _, k, estimate in sorted(found, key=lambda item: item[:2])[:3]:
-        better = bundle.solve(estimate, [2.0] + [1.0] * 12)
+    for _, k, estimate in sorted(found, key=lambda item: item[:2])[:FINALISTS]:
+        better = bundle.solve(estimate, [2.0] + [1.0] * (FINAL_STEPS - 1))
         finished.append((bundle.cost(bundle.residual(better), 1.0), k, better))
     return min(finished, key=lambda item: item[:2])[2], turned
