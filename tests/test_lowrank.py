@@ -34,13 +34,13 @@ def holes(xy: np.ndarray, share: float = 0.3, seed: int = 1) -> Tracks:
 
 def residual(tracks: Tracks, rank: int = 3, iterations: int = 5) -> np.ndarray:
     """Distance of each trajectory from the subspace that all of them together span best."""
-    W, seen = trajectory_matrix(tracks)
+    W, seen = trajectory_matrix(tracks, 99)
     return Subspace.fit(W, seen, rank, iterations).distance(W, seen)
 
 
 def test_the_matrix_holds_x_and_y_in_turn_and_nothing_where_nothing_was_seen() -> None:
     tracks = holes(body(points=6, frames=5))
-    W, seen = trajectory_matrix(tracks)
+    W, seen = trajectory_matrix(tracks, 99)
     assert W.shape == seen.shape == (10, 6)
     for row in range(10):
         assert np.array_equal(seen[row] > 0, tracks.visible[row // 2])
@@ -76,7 +76,7 @@ def test_a_body_is_predicted_from_half_of_its_points(broken: bool) -> None:
     xy = body(points=60)
     stranger = body(points=30, seed=3) + np.arange(15)[:, None, None] ** 2 * [0.5, 0]
     everything = np.concatenate([xy, stranger], axis=1) + rng.normal(0, 0.05, (15, 90, 2))
-    W, seen = trajectory_matrix(holes(everything) if broken else Tracks.from_array(everything))
+    W, seen = trajectory_matrix(holes(everything) if broken else Tracks.from_array(everything), 99)
     subspace = Subspace.fit(W[:, :30], seen[:, :30], 3)
     assert subspace.rank == 3
     distance = subspace.distance(W, seen)

@@ -106,17 +106,22 @@ def test_similarity_counts_shared_frames_only() -> None:
 
 def test_data_term_is_equation_3_5() -> None:
     residual = np.array([[0.5, 1.0, 9.0], [2.0, 0.1, np.inf]])
-    models = AffineModels(np.ones((2, 3), bool), np.zeros((2, 3, 2)), np.array([False, True]))
-    background = np.array([True, False, True])
+    inliers = np.array([[True, False, True], [False, True, False]])
+    models = AffineModels(inliers, np.zeros((2, 3, 2)), np.array([False, True]))
+    moving = np.array([0.1, 0.8, 0.3])
     strict = replace(CONFIG, attribute_data=True, outlier_cost=3.0)
-    assert data_term(residual, models, background, 1.0, strict).tolist() == [
-        [0.5, 3.0],
-        [3.0, 0.1],
-        [3.0, 3.0],
-    ]
-    free = replace(strict, attribute_data=False)
-    assert data_term(residual, models, background, 1.0, free).tolist() == [[0.5, 2.0], [1.0, 0.1], [3.0, 3.0]]
-    assert data_term(residual, models, background, 2.0, free)[0].tolist() == [0.25, 1.0]
+    assert_allclose(data_term(residual, models, moving, 1.0, strict), [[0.5, 3.0], [3.0, 0.1], [3.0, 3.0]])
+    free = replace(strict, attribute_data=False, moving_weight=0.0)
+    assert_allclose(data_term(residual, models, moving, 1.0, free), [[0.5, 2.0], [1.0, 0.1], [3.0, 3.0]])
+    assert_allclose(data_term(residual, models, moving, 2.0, free)[0], [0.25, 1.0])
+
+
+def test_a_model_costs_by_how_far_its_inliers_are_from_the_point_in_moving() -> None:
+    inliers = np.array([[True, False, True], [False, True, False]])
+    models = AffineModels(inliers, np.zeros((2, 3, 2)), np.array([False, True]))
+    soft = replace(CONFIG, attribute_data=False, moving_weight=2.0)
+    cost = data_term(np.zeros((2, 3)), models, np.array([0.1, 0.8, 0.3]), 1.0, soft)
+    assert_allclose(cost, [[0.2, 1.4], [1.2, 0.0], [0.2, 1.0]])
 
 
 @pytest.mark.parametrize("attribute_data", [False, True])
@@ -135,12 +140,11 @@ def test_energy_is_equation_3_4_with_every_edge_twice(attribute_data: bool) -> N
     assert 0 < models.foreground.mean() < 1
     residual = residuals(tracks, models, config.centred)
     start = assign(tracks, models, residual, 0, config.nearest_models)
-    anchor = tracks.xy[0]
-    labels, solution = refine(tracks, models, residual, start, background, anchor, 1.0, config)
+    edges = delaunay_edges(tracks.xy[0])
+    D = data_term(residual, models, 1.0 - background, 1.0, config)
+    labels, solution = refine(tracks, models, D, start, edges, 1.0, config)
 
-    edges = delaunay_edges(anchor)
     alpha = similarity(tracks, edges, 1.0, config.motion_sigma)
-    D = data_term(residual, models, background, 1.0, config)
     attribute = models.foreground
     total = config.data_weight * sum(D[p, label] for p, label in enumerate(labels))
     for p in range(tracks.points):  # the sum over p and over N(p)
@@ -156,16 +160,17 @@ def test_energy_is_equation_3_4_with_every_edge_twice(attribute_data: bool) -> N
 
 def test_smoothness_alone_leaves_one_label_and_data_alone_the_best() -> None:
     scene = make_scene(movers=(LEFT_CAR,), static=60)
-    tracks, background = scene.tracks, np.ones(90, bool)
-    models = sample_models(tracks, background, 0, 1.0, CONFIG, np.random.default_rng(0))
+    tracks, edges = scene.tracks, delaunay_edges(scene.tracks.xy[0])
+    models = sample_models(tracks, np.ones(90, bool), 0, 1.0, CONFIG, np.random.default_rng(0))
     residual = residuals(tracks, models, True)
     start = np.zeros(90, np.int64)
 
     def labels(**weights: float) -> np.ndarray:
         config = replace(CONFIG, **weights)
-        return refine(tracks, models, residual, start, background, tracks.xy[0], 1.0, config)[0]
+        cost = data_term(residual, models, np.zeros(90), 1.0, config)
+        return refine(tracks, models, cost, start, edges, 1.0, config)[0]
 
     smooth = labels(data_weight=0.0, motion_weight=1.0)
     assert len(np.unique(smooth)) == 1
-    best = labels(motion_weight=0.0, attribute_weight=0.0, outlier_cost=1e6)
+    best = labels(motion_weight=0.0, attribute_weight=0.0, outlier_cost=1e6, moving_weight=0.0)
     assert_allclose(residual[best, np.arange(90)], residual.min(axis=0))

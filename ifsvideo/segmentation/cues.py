@@ -98,7 +98,8 @@ class Cues:
         """Measure a group by itself."""
         sample = reliable[:: 1 + (len(reliable) - 1) // _MOST]
         W, seen = self.W[:, sample], self.seen[:, sample]
-        rigid, affine = (Subspace.fit(W, seen, rank).distance(self.W, self.seen) for rank in (3, 2))
+        space = Subspace.fit(W, seen, 3)
+        rigid, affine = (each.distance(self.W, self.seen) for each in (space, space.main(W, seen, 2)))
         evidence = float(np.median(self.evidence[reliable]))
         return Group(members, reliable, sample, evidence, self._inside(reliable), rigid, affine)
 

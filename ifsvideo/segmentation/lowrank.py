@@ -39,7 +39,7 @@ class Subspace:
     mean: Array
 
     @classmethod
-    def fit(cls, W: Array, seen: Array, rank: int, iterations: int = 5) -> Subspace:
+    def fit(cls, W: Array, seen: Array, rank: int, iterations: int = 3) -> Subspace:
         """Best subspace of trajectories (2F, P): by singular values where they are complete; with gaps,
         directions and points are solved in turn by least squares over what was measured."""
         points = W.shape[1]
@@ -58,6 +58,16 @@ class Subspace:
             rows = np.linalg.solve(left, ((W * seen) @ place.T)[:, :, None])[:, :, 0]
             found = cls(rows[:, :rank], rows[:, rank])
         return found
+
+    def main(self, W: Array, seen: Array, rank: int) -> Subspace:
+        """The subspace of fewer dimensions in which most of the trajectories' (2F, P) spread lies."""
+        if rank >= self.rank:
+            return self
+        inside = self._coordinates(W, seen)
+        mean = inside.mean(axis=1)
+        U, S, _ = np.linalg.svd(self.directions @ (inside - mean[:, None]), full_matrices=False)
+        scale = S[:rank] / np.sqrt(W.shape[1])
+        return Subspace(U[:, :rank] * scale, self.mean + self.directions @ mean)
 
     @property
     def rank(self) -> int:

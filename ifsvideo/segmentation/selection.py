@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 def needed_models(cost: NDArray[np.float64], label_cost: float) -> NDArray[np.int64]:
-    """Models to keep: each in turn the one that lowers the points' cost most, while it does by ``label_cost``.
+    """Models to keep, each the one that then lowers what points pay most, while it does by ``label_cost``.
 
     Parameters
     ----------

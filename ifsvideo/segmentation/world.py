@@ -38,10 +38,11 @@ STARTS = ((0, 0, -1), (1, 0, 0), (0.7, 0, -0.7), (-0.7, 0, -0.7), (0, 1, 0))
 negatives come out of the sign of the first depths."""
 START_POINTS = 100
 """Points of the starts, thinned so that no corner of the picture has its way."""
-PARALLAX_SHARE = 0.2
-"""A camera has moved, not only turned, if the points that need it to have moved weigh at least so many times
-those that do not: depth shows in many places, a thing that moves in one. More finds larger things before a
-standing camera, and takes more of a scene with little parallax for movers."""
+PARALLAX_CELLS, PARALLAX_SHARE = 12, 0.12
+"""A camera has moved, not only turned, if points need it to have moved in at least this share of the cells in
+which there are points, of so many along the longer side: depth shows in many places, a thing that moves in
+one. More finds larger things before a standing camera, and takes more of a scene with little parallax for
+movers."""
 FINALISTS, FINAL_STEPS = 2, 7
 """Starts that are followed to their end, and the steps of each; more found nothing better."""
 LAST_STEPS = 3
@@ -175,8 +176,11 @@ def _has_moved(bundle: Bundle, moved: Estimate, far: Estimate) -> bool:
     """
     near = bundle.rms(bundle.residual(moved)) < bundle.tolerance
     still = bundle.rms(bundle.residual(far)) < 2 * bundle.tolerance
-    needing = bundle.weight[near & ~still].sum()
-    return bool(needing >= PARALLAX_SHARE * bundle.weight[still].sum())
+    counted = bundle.weight > 0
+    place = np.nanmean(np.where(bundle.seen[..., None], bundle.observed, np.nan)[:, counted], axis=0)
+    cell = np.floor((place + 0.5) * PARALLAX_CELLS).astype(int) @ [1, 100]
+    needing = np.unique(cell[(near & ~still)[counted]])
+    return len(needing) >= PARALLAX_SHARE * len(np.unique(cell))
 
 
 def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estimate]:
