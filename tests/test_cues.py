@@ -7,7 +7,6 @@ import pytest
 
 from ifsvideo.segmentation import shear
 from ifsvideo.segmentation.cues import CUES, Cues, Group
-from ifsvideo.segmentation.refinement import delaunay_edges
 from ifsvideo.types import Tracks
 
 FRAMES = 15
@@ -84,8 +83,7 @@ def test_shear_and_its_ratio_are_those_of_the_thesis() -> None:
     cues, pieces = measure(tracks)
     a, b = pieces[0].members, pieces[2].members
     between = shear.score(tracks, shear.between_edges(tracks.xy[0], a, b, 10))
-    graph = delaunay_edges(tracks.xy[0])
-    inside = [shear.score(tracks, graph[np.isin(graph, part).all(axis=1)]) for part in (a, b)]
+    inside = [shear.score(tracks, shear.inside_edges(tracks.xy[0], part)) for part in (a, b)]
     assert cue("shear", cues, pieces[0], pieces[2]) == pytest.approx(between)
     assert cue("shear_ratio", cues, pieces[0], pieces[2]) == pytest.approx(between / (sum(inside) / 2))
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ifsvideo.segmentation import shear
 from ifsvideo.segmentation.lowrank import Subspace, trajectory_matrix
-from ifsvideo.segmentation.refinement import delaunay_edges
 from ifsvideo.types import Tracks
 
 Array = NDArray[np.float64]
@@ -81,9 +80,6 @@ class Cues:
         self.tracks, self.anchor, self.evidence, self.unit, self.pairs = tracks, anchor, evidence, unit, pairs
         self.W, self.seen = trajectory_matrix(tracks, _KEY_FRAMES)
         self.noise = self.typical_inside = 0.0
-        # Edges with both ends in a group are inside it.
-        self._graph = delaunay_edges(anchor)
-        self._graph_sum, self._graph_seen = shear.totals(tracks, self._graph)
 
     def groups(self, segments: list[tuple[Members, Members]]) -> list[Group]:
         """Groups of the segments that a window starts with: (members, reliable) each."""
@@ -100,16 +96,10 @@ class Cues:
         W, seen = self.W[:, sample], self.seen[:, sample]
         space = Subspace.fit(W, seen, 3)
         rigid, affine = (each.distance(self.W, self.seen) for each in (space, space.main(W, seen, 2)))
-        evidence = float(np.median(self.evidence[reliable]))
-        return Group(members, reliable, sample, evidence, self._inside(reliable), rigid, affine)
-
-    def _inside(self, members: Members) -> float:
-        """Shear and stretch of the edges inside a group, NaN where none was seen."""
-        own = np.zeros(len(self.anchor), dtype=bool)
-        own[members] = True
-        edges = own[self._graph].all(axis=1)
-        seen = self._graph_seen[edges].sum()
-        return float(self._graph_sum[edges].sum() / seen) if seen else float("nan")
+        inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
+        return Group(
+            members, reliable, sample, float(np.median(self.evidence[reliable])), inside, rigid, affine
+        )
 
     def merge(self, a: Group, b: Group) -> Group:
         """Both as one."""

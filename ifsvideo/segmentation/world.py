@@ -36,15 +36,15 @@ LENS_SPREAD = np.array([0.3, 0.15])
 STARTS = ((0, 0, -1), (1, 0, 0), (0.7, 0, -0.7), (-0.7, 0, -0.7), (0, 1, 0))
 """Directions of the camera's motion from which the fit starts: ahead, aside, half of each, up; their
 negatives come out of the sign of the first depths."""
-START_POINTS = 100
+START_POINTS = 120
 """Points of the starts, thinned so that no corner of the picture has its way."""
 PARALLAX_CELLS, PARALLAX_SHARE = 12, 0.12
 """A camera has moved, not only turned, if points need it to have moved in at least this share of the cells in
 which there are points, of so many along the longer side: depth shows in many places, a thing that moves in
 one. More finds larger things before a standing camera, and takes more of a scene with little parallax for
 movers."""
-FINALISTS, FINAL_STEPS = 2, 7
-"""Starts that are followed to their end, and the steps of each; more found nothing better."""
+FINALISTS, FINAL_STEPS = 3, 8
+"""Starts that are followed to their end, and the steps of each: of two, both are sometimes wrong."""
 LAST_STEPS = 3
 """Steps with all points, from what the few of the starts found."""
 FALLING = [16.0, 8.0, 4.0, 2.0, 1.4, 1.0]
