@@ -14,6 +14,8 @@ from ifsvideo.types import BACKGROUND
 
 _SPREAD_CELLS = 8
 """The picture is divided into so many cells a side to see how widely a motion is spread."""
+_FEW = 10
+"""Points beyond which doubt falls with the square of their number."""
 
 
 def merge_and_label(
@@ -55,7 +57,8 @@ def merge_and_label(
             parts = [_measured(merging, piece, reliable) for piece in pieces]
         for part in parts:
             apart, count = merging.apart(part, still), len(part.members)
-            few = count < config.least_points or apart < expit(config.few_points_doubt / count**2)
+            doubt = config.few_points_doubt / count * min(1.0, _FEW / count)
+            few = count < config.least_points or apart < expit(doubt)
             if motions is None and few:
                 confidence[part.members] = 1 - apart
             else:

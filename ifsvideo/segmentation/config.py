@@ -67,11 +67,8 @@ class SegmenterConfig:
     motion_sigma: float = 5.0
     """sigma of eq. 3.7: at a distance of 20 px a difference in velocity of 0.3 px a frame halves the
     coherence."""
-    iterations: int = 10
-    """Iterations of TRW-S at most; twice as many lower the energy by less than the sampling varies it."""
-    key_frames: int = 12
-    """Frames of a window in which models are sampled and residuals measured, evenly spaced; more cost time
-    and tell little, a motion is smooth."""
+    iterations: int = 20
+    """Iterations of TRW-S at most."""
     merging: Literal["evidence", "shear"] = "evidence"
     """Stage 5: ``shear`` is the thesis's Algorithm 3, ``evidence`` weighs shear with cross prediction,
     nearness and the static world."""
@@ -85,10 +82,10 @@ class SegmenterConfig:
     likely moving as not."""
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
-    few_points_doubt: float = 250.0
-    """Log odds by which a group must be another motion than the background, over the square of the number of
-    its points: five must be all but certain, ten are believed at 12 to 1, twenty at 2 to 1. What slips along
-    an edge is seldom more than a handful."""
+    few_points_doubt: float = 25.0
+    """Log odds by which a group must be another motion than the background, over the number of its points,
+    and beyond ten over its square: five are believed at 150 to 1, ten at 12 to 1, twenty at 2 to 1. What
+    slips along an edge is seldom more than a handful."""
     gap: float = 50.0
     """Distance at which what moves alike is several things, pixels: no part of a car is so far from the next.
     Faults of tracking are spread over the picture, and each is then judged by itself."""
@@ -136,7 +133,5 @@ class SegmenterConfig:
             centred=False,
             attribute_data=True,
             label_cost=0.0,
-            iterations=20,
-            key_frames=10**6,
             merging="shear",
         )

@@ -15,7 +15,6 @@ from ifsvideo.segmentation.background import background_first, merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import Cues
 from ifsvideo.segmentation.epipolar import epipolar_support
-from ifsvideo.segmentation.key_frames import key_frames
 from ifsvideo.segmentation.merging import merge_by_shear
 from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
@@ -81,12 +80,10 @@ class IFSSegmenter:
         support, evidence, details = self._split(tracks, size, unit, rng)
         background = support >= 0.5
         # 2. and 3. Affine motion models in small disks; every point to one of the nearest that explain it.
-        frames = np.union1d(key_frames(tracks.frames, config.key_frames), base)
-        thin = replace(tracks, xy=tracks.xy[frames], visible=tracks.visible[frames])
-        models = sample_models(thin, background, int(np.searchsorted(frames, base)), unit, config, rng)
+        models = sample_models(tracks, background, base, unit, config, rng)
         graph = delaunay_edges(anchor)
         if len(models):
-            residual = residuals(thin, models, config.centred)
+            residual = residuals(tracks, models, config.centred)
             cost = data_term(residual, models, 1 - support, unit, config)
             start = assign(tracks, models, residual, base, config.nearest_models)
             if config.label_cost > 0:

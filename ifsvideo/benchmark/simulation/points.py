@@ -16,8 +16,6 @@ _BORDER = 6.0
 """Pixels at the picture's edge in which no track lives: the window of a tracker would hang over."""
 _FARTHEST_GROUND_M = 80.0
 _MOST_ON_MOVER = 150
-_LEAST_ON_MOVER, _MANY_ON_MOVER = 8, 300
-"""Pixels that are looked at on a mover: a plain lorry shows a few corners, a chequered one hundreds."""
 _OCCLUSION_STRIDE = 3
 """Standing boxes hide little from frame to frame: looking at every third frame is a third of the work."""
 
@@ -65,7 +63,7 @@ def find_corners(rng: np.random.Generator, scene: Scene, wanted: int) -> Corners
     frames = len(scene.camera.centres)
     width, height = scene.camera.size
     cell = float(np.sqrt(width * height / (1.7 * wanted)))
-    loss = rng.uniform(0.0, 0.5)
+    loss = rng.uniform(0.1, 0.6)
     kept = Corners(np.empty((frames, 0, 3)), np.empty(0, np.int64), np.empty((frames, 0), bool))
     for frame in (0, frames // 4, frames // 2):
         seen = scene.camera.project(kept.places)[frame][kept.visible[frame]]
@@ -99,8 +97,7 @@ def _on_outlines(rng: np.random.Generator, scene: Scene, frame: int, cell: float
             continue
         low = np.clip(outline.min(axis=0), 0, scene.camera.size)
         high = np.clip(outline.max(axis=0), 0, scene.camera.size)
-        most = np.exp(rng.uniform(np.log(_LEAST_ON_MOVER), np.log(_MANY_ON_MOVER)))
-        finer = max(float(np.sqrt(np.prod(high - low) / most)), min(0.5 * cell, 7.0))
+        finer = max(float(np.sqrt(np.prod(high - low) / _MOST_ON_MOVER)), min(0.5 * cell, 9.0))
         if (high - low).min() < finer:
             continue
         extent = (int(np.ceil(high[0] - low[0])), int(np.ceil(high[1] - low[1])))
