@@ -32,7 +32,8 @@ class CameraFixed:
     its life, left the place by several times what the track itself did. Where most of the picture stays put,
     the camera stands still and nothing is fixed to it.
 
-    Of the past as much is kept as ``config.fixed_memory_s`` says. Once fixed, a track stays so.
+    Of the past as much is kept as ``config.fixed_memory_s`` says. Once fixed, a track stays so while it
+    stays put: a far point can seem fixed for a second, until it is near enough to go.
 
     Parameters
     ----------
@@ -79,6 +80,7 @@ class CameraFixed:
         near = np.flatnonzero((gone <= 4 * bound) & (count >= _LEAST_LOOKS))
         spread[near] = _spread(xy[:, near], count[near])
         still, moving = spread < bound, (spread >= bound) & (gone > 4 * bound)
+        self.ids = np.setdiff1d(self.ids, ids[spread >= bound])
         self._follow_world(ids[still], ids[moving])
         self._judge(ids[still], spread[still], xy[:, still], unit)
 

@@ -133,14 +133,11 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     X = np.column_stack([place / np.exp(LENS_PRIOR[0]), np.zeros(tracks.points)])
     few = bundle.subset(picked)
     start, turned = _best_start(few, X[picked], time)
-    far = _all_far(few, turned, X[picked])
-    moved = _has_moved(few, start, far)
-    start = start if moved else far
-    X[:, :2] *= np.exp(LENS_PRIOR[0] - start.log_focal)
-    X[:, 2] = np.median(start.X[:, 2])
-    X[picked] = start.X
-    estimate = bundle.solve_points(replace(start, X=X), 6)
-    estimate = bundle.solve_points(bundle.solve(estimate, [1.0] * LAST_STEPS, translate=moved), 3)
+    moved = bundle.solve_points(_with_all(start, X, picked), 6)
+    far = bundle.solve_points(_with_all(_all_far(few, turned, X[picked]), X, picked), 3)
+    has_moved = _has_moved(bundle, moved, far)
+    estimate = bundle.solve(moved if has_moved else far, [1.0] * LAST_STEPS, translate=has_moved)
+    estimate = bundle.solve_points(estimate, 3)
     return World(
         frames,
         reference,
@@ -166,6 +163,15 @@ def _all_far(bundle: Bundle, turned: Estimate, X: Array) -> Estimate:
     bearing = np.column_stack([X[:, :2] * np.exp(LENS_PRIOR[0] - turned.log_focal), np.zeros(len(X))])
     far = bundle.solve_points(replace(turned, X=bearing), 3)
     return bundle.solve_points(bundle.solve(far, [1.0] * 4, translate=False), 3)
+
+
+def _with_all(found: Estimate, X: Array, picked: NDArray[np.int64]) -> Estimate:
+    """What was found with some points, and the others where they are seen, as far as the typical one."""
+    places = X.copy()
+    places[:, :2] *= np.exp(LENS_PRIOR[0] - found.log_focal)
+    places[:, 2] = np.median(found.X[:, 2])
+    places[picked] = found.X
+    return replace(found, X=places)
 
 
 def _has_moved(bundle: Bundle, moved: Estimate, far: Estimate) -> bool:
