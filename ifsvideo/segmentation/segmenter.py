@@ -79,17 +79,18 @@ class IFSSegmenter:
         # 1. What agrees with a static world seen by a moving camera.
         support, evidence, details = self._split(tracks, size, unit, rng)
         background = support >= 0.5
-        # 2. and 3. Affine motion models in small disks; every point to one of the nearest that explain it.
+        # 2. and 3. Affine motion models in small disks, those that are needed; every point to one of them.
         models = sample_models(tracks, background, base, unit, config, rng)
         graph = delaunay_edges(anchor)
         if len(models):
             residual = residuals(tracks, models, config.centred)
             cost = data_term(residual, models, 1 - support, unit, config)
-            start = assign(tracks, models, residual, base, config.nearest_models)
             if config.label_cost > 0:
                 kept = needed_models(cost, config.label_cost)
                 models, residual, cost = models.select(kept), residual[kept], cost[:, kept]
                 start = cost.argmin(axis=1)
+            else:
+                start = assign(tracks, models, residual, base, config.nearest_models)
             # 4. Segments with clean borders, more of them than motions.
             chosen, solution = refine(tracks, models, cost, start, graph, unit, config)
             fit = residual[chosen, np.arange(tracks.points)] / unit
