@@ -5,39 +5,39 @@ Tracks from anywhere: ``segment(tracks)``.
 """
 
 import os
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 # The matrices are small: several BLAS threads wait for each other longer than they work. No effect where
 # numpy was imported before, or the user decided.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from numpy.typing import NDArray
-
-from ifsvideo.clip import as_tracks
-from ifsvideo.config import Config, ObjectsConfig, OverlayConfig, TrackerConfig
-from ifsvideo.config_file import load_config
-from ifsvideo.errors import IfsVideoError, InputError, OutputError, UsageError
-from ifsvideo.objects.history import Event, ObjectTable
-from ifsvideo.output.overlay import OverlayRenderer
-from ifsvideo.output.products import Products
-from ifsvideo.pipeline import Pipeline
-from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.segmenter import IFSSegmenter
-from ifsvideo.tracking.files import load_tracks
-from ifsvideo.tracking.tracker import KltTracker
-from ifsvideo.types import (
-    FramePoints,
-    LabelTable,
-    MovingObject,
-    Renderer,
-    Result,
-    Scene,
-    Segmentation,
-    Segmenter,
-    Tracker,
-    Tracks,
-    VideoInfo,
-)
+if TYPE_CHECKING:
+    from ifsvideo.config import Config, ObjectsConfig, OverlayConfig, TrackerConfig
+    from ifsvideo.config_file import load_config
+    from ifsvideo.errors import IfsVideoError, InputError, OutputError, UsageError
+    from ifsvideo.objects.history import Event, ObjectTable
+    from ifsvideo.output.overlay import OverlayRenderer
+    from ifsvideo.output.products import Products
+    from ifsvideo.pipeline import Pipeline
+    from ifsvideo.segmentation.config import SegmenterConfig
+    from ifsvideo.segmentation.segmenter import IFSSegmenter
+    from ifsvideo.segmenting import segment
+    from ifsvideo.tracking.files import load_tracks
+    from ifsvideo.tracking.tracker import KltTracker
+    from ifsvideo.types import (
+        FramePoints,
+        LabelTable,
+        MovingObject,
+        Renderer,
+        Result,
+        Scene,
+        Segmentation,
+        Segmenter,
+        Tracker,
+        Tracks,
+        VideoInfo,
+    )
 
 __version__ = "0.1.0"
 
@@ -75,28 +75,34 @@ __all__ = [
     "segment",
 ]
 
+_HOMES = {
+    "config": ("Config", "ObjectsConfig", "OverlayConfig", "TrackerConfig"),
+    "config_file": ("load_config",),
+    "errors": ("IfsVideoError", "InputError", "OutputError", "UsageError"),
+    "objects.history": ("Event", "ObjectTable"),
+    "output.overlay": ("OverlayRenderer",),
+    "output.products": ("Products",),
+    "pipeline": ("Pipeline",),
+    "segmentation.config": ("SegmenterConfig",),
+    "segmentation.segmenter": ("IFSSegmenter",),
+    "segmenting": ("segment",),
+    "tracking.files": ("load_tracks",),
+    "tracking.tracker": ("KltTracker",),
+}
+"""Modules of the names above; of those not told here, `ifsvideo.types`."""
 
-def segment(
-    tracks: Tracks | NDArray[Any],
-    motions: int | None = None,
-    config: SegmenterConfig | None = None,
-    seed: int = 0,
-) -> Segmentation:
-    """Tell apart the motions of tracks from anywhere; all frames are one window.
 
-    Parameters
-    ----------
-    tracks : Tracks, or (F, P, 2) array
-        Pixels; NaN (or a masked array's mask) where a point is not seen.
-    motions : int, optional
-        Number of motions, the background's included, where it is known.
-    config : SegmenterConfig, optional
-    seed : int, optional
-        The same tracks and seed give the same labels.
+def __getattr__(name: str) -> Any:
+    """Import a name when it is asked for.
 
-    Returns
-    -------
-    Segmentation
-        ``labels`` (P,): 0 background, 1, 2, ... moving, -1 undecided.
+    OpenCV and SciPy take half a second to load, in which Ctrl-C would raise before the command can catch it.
     """
-    return IFSSegmenter(config or SegmenterConfig(), seed).segment(as_tracks(tracks), motions)
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = next((module for module, names in _HOMES.items() if name in names), "types")
+    globals()[name] = value = getattr(import_module(f"{__name__}.{home}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -46,6 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _signals_raise(), _flushed():
             return _run(parse(argv), debug)
     except _Interrupted as interrupted:
+        print("ifsvideo: interrupted", file=sys.stderr)
         return interrupted.exit_status
     except BrokenPipeError:
         # Whoever read our summary has left; Python's own flush at exit must not complain of it.

@@ -308,7 +308,30 @@ def test_a_signal_to_the_command_as_it_is(tmp_path):
             assert process.poll() is None
             seen += process.stderr.read(1)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
+        _, err = process.communicate(timeout=30)
     assert process.returncode == 130
+    assert err.endswith(b"ifsvideo: interrupted\n")
     assert list(snapshot(tmp_path)) == ["clip.mp4"]
     assert children_naming(str(tmp_path)) == []
+
+
+# Runs the command as it is installed; somebody presses Ctrl-C while a library is being imported.
+HASTY = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Finder:
+    def find_spec(self, name, *_):
+        if name == sys.argv[1]:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+from ifsvideo.__main__ import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("library", ["numpy", "cv2", "scipy.optimize"])
+def test_ctrl_c_while_libraries_are_loaded_is_one_line(library):
+    done = subprocess.run(
+        [sys.executable, "-c", HASTY, library], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "ifsvideo: interrupted\n")

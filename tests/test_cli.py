@@ -4,6 +4,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
@@ -181,6 +183,17 @@ def test_version(capsys):
     with pytest.raises(SystemExit):
         cli.main(["--version"])
     assert capsys.readouterr().out == f"ifsvideo {ifsvideo.__version__}\n"
+
+
+def test_the_command_is_installed_where_ctrl_c_is_caught_and_the_package_imports_nothing_large():
+    settings = tomllib.loads((Path(ifsvideo.__file__).parents[1] / "pyproject.toml").read_text())
+    assert settings["project"]["scripts"] == {"ifsvideo": "ifsvideo.__main__:main"}
+    program = "import sys, ifsvideo; print(*sorted({'numpy', 'cv2', 'scipy'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "")
+    with pytest.raises(AttributeError, match="'ifsvideo' has no attribute 'Pipelin'"):
+        ifsvideo.Pipelin  # noqa: B018
+    assert set(ifsvideo.__all__) <= set(dir(ifsvideo))
 
 
 def test_several_inputs(clips, tmp_path, capsys):
