@@ -17,10 +17,13 @@ from ifsvideo.config_file import load_config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, parse_area
 from ifsvideo.lens import check_k1
-from ifsvideo.output.products import Products
+from ifsvideo.output.products import BESIDE, Products
 from ifsvideo.video import ANIMATIONS, FORMATS, parse_time
 
 _Value = TypeVar("_Value")
+
+_OPTIONS = {"summary": "json"}
+"""Options of further outputs, where they are not called as `Products` calls these."""
 
 _EXAMPLES = """\
 examples:
@@ -86,12 +89,11 @@ def parse(argv: Sequence[str] | None = None) -> Arguments:
     """
     told = _parser().parse_args(argv)
     config = _config(told)
-    output = None if told.output is None else Path(told.output)
     sources = told.input[:1] if told.join else told.input
     folder = _folder(told.output, sources)
     ending = ".mov" if config.overlay.transparent else ".mp4"
     return Arguments(
-        jobs=_wanted(told, _jobs(sources, output, folder, told.labels, _products(told), ending)),
+        jobs=_wanted(told, _jobs(told, sources, folder, ending)),
         folder=folder,
         workers=told.jobs,
         config=config,
@@ -147,7 +149,11 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_products(parser: argparse.ArgumentParser) -> None:
-    products = parser.add_argument_group("further outputs")
+    products = parser.add_argument_group(
+        "further outputs",
+        "Without FILE or DIR, which several inputs and -o DIR demand, they go beside the overlay: out.mp4,\n"
+        "out.objects.csv, out.masks. Such options stand behind the inputs.",
+    )
     for option, place, text in (
         ("--report", "FILE", ".html: page with the video, a timeline and table of objects, and plots"),
         (
@@ -161,7 +167,7 @@ def _add_products(parser: argparse.ArgumentParser) -> None:
         ("--mot", "FILE", ".txt: the boxes as MOTChallenge rows"),
         ("--tracks", "FILE", ".npz: every track; can be the input of another run"),
     ):
-        products.add_argument(option, type=Path, metavar=place, help=text)
+        products.add_argument(option, nargs="?", const=True, type=Path, metavar=place, help=text)
 
 
 def _add_reading(parser: argparse.ArgumentParser) -> None:
@@ -332,10 +338,13 @@ def _overlay(told: argparse.Namespace, config: OverlayConfig) -> OverlayConfig:
     return replace(config, **{name: wish for name, wish in wishes.items() if wish is not None})
 
 
-def _products(told: argparse.Namespace) -> Products:
-    """Places of the further outputs; only the summary's option has a name of its own."""
-    names = {item.name for item in fields(Products)} - {"summary"}
-    return Products(summary=told.json, **{name: getattr(told, name) for name in names})
+def _products(told: argparse.Namespace, overlay: Path) -> Products:
+    """Places of the further outputs; where none is told, beside the overlay."""
+    wanted = {item.name: getattr(told, _OPTIONS.get(item.name, item.name)) for item in fields(Products)}
+    places = {
+        name: overlay.with_suffix(BESIDE[name]) if place is True else place for name, place in wanted.items()
+    }
+    return Products(**places)
 
 
 def _folder(output: str | None, sources: Sequence[Path]) -> Path | None:
@@ -363,21 +372,17 @@ def _wanted(told: argparse.Namespace, jobs: tuple[Job, ...]) -> tuple[Job, ...]:
 
 
 def _jobs(
-    sources: Sequence[Path],
-    output: Path | None,
-    folder: Path | None,
-    labels: Path | None,
-    products: Products,
-    ending: str,
+    told: argparse.Namespace, sources: Sequence[Path], folder: Path | None, ending: str
 ) -> tuple[Job, ...]:
     """What is written of each input."""
-    several = len(sources) > 1 or folder is not None
-    if several and (labels or any(products.named())):
-        raise UsageError("--labels and the like name one file; give one input and one -o, or leave them out")
-    if folder is not None:
-        jobs = tuple(_job_in(folder, source, ending) for source in sources)
-    else:
-        jobs = tuple(_job(source, output, labels, products, ending) for source in sources)
+    if len(sources) == 1 and folder is None:
+        return (_job(told, sources[0], ending),)
+    for option in ("labels", *(_OPTIONS.get(item.name, item.name) for item in fields(Products))):
+        place = getattr(told, option)
+        if isinstance(place, Path):
+            remedy = "leave it out" if option == "labels" else f"write --{option} alone, behind the inputs"
+            raise UsageError(f"--{option} {place} would name one place for every input; {remedy}")
+    jobs = tuple(_job_in(told, folder, source, ending) for source in sources)
     places = [job.labels for job in jobs]
     twice = next((place for place in places if places.count(place) > 1), None)
     if twice is not None:
@@ -385,23 +390,32 @@ def _jobs(
     return jobs
 
 
-def _job(source: Path, output: Path | None, labels: Path | None, products: Products, ending: str) -> Job:
-    if output is not None and not output.name:
+def _job(told: argparse.Namespace, source: Path, ending: str) -> Job:
+    """What is written of the only input."""
+    if told.output is not None and not Path(told.output).name:
         raise UsageError("-o needs the name of a file, such as out.mp4")
-    if output is None:
-        output = _named(None, source, ending)
-        if is_tracks_file(source):
-            return Job(source, None, labels or output.with_suffix(".csv"), products)
-    return Job(source, output, labels or output.with_suffix(".csv"), products)
+    overlay = _named(None, source, ending) if told.output is None else Path(told.output)
+    silent = told.output is None and is_tracks_file(source)
+    return Job(
+        source,
+        None if silent else overlay,
+        told.labels or overlay.with_suffix(".csv"),
+        _products(told, overlay),
+    )
 
 
-def _job_in(folder: Path, source: Path, ending: str) -> Job:
-    """All that a folder of results holds of an input."""
+def _job_in(told: argparse.Namespace, folder: Path | None, source: Path, ending: str) -> Job:
+    """What is written of one input of several: in a folder of results report and summary, too."""
     if source == Path("-"):
         raise UsageError("standard input has no name; name the output (-o FILE)")
-    output = _named(folder, source, ending)
-    products = Products(report=output.with_suffix(".html"), summary=output.with_suffix(".json"))
-    return Job(source, None if is_tracks_file(source) else output, output.with_suffix(".csv"), products)
+    overlay = _named(folder, source, ending)
+    products = _products(told, overlay)
+    if folder is not None:
+        always = {name: overlay.with_suffix(BESIDE[name]) for name in ("report", "summary")}
+        products = replace(products, **always)
+    if source.is_dir() or is_tracks_file(source):  # there is no video to cut clips out of
+        products = replace(products, clips=None)
+    return Job(source, None if is_tracks_file(source) else overlay, overlay.with_suffix(".csv"), products)
 
 
 def _named(folder: Path | None, source: Path, ending: str) -> Path:

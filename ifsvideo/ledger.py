@@ -53,7 +53,7 @@ class Ledger:
         wanted = {
             path.name for path in (job.output, job.labels, *dict(job.products.named()).values()) if path
         }
-        there = {name for name in entry["files"] if (self._folder / name).is_file()}
+        there = {name for name in entry["files"] if (self._folder / name).exists()}
         return wanted <= there == set(entry["files"])
 
     def note(self, job: Job, told: Arguments, outcome: Outcome | Exception) -> None:

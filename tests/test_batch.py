@@ -60,6 +60,26 @@ def test_one_folder_holds_everything_and_a_page_links_it(inputs, tmp_path, capsy
     assert "index.html: all results" in capsys.readouterr().out
 
 
+def test_further_outputs_of_every_input_stand_in_the_folder(inputs, tmp_path, capsys):
+    options = ["--objects", "--mot", "--masks", "--tracks", "--clips"]
+    (inputs / "c.mp4").write_text("no video")
+    assert run(inputs, *options, "--jobs", "2") == 5
+    out = tmp_path / "out"
+    kinds = ["clips", "csv", "html", "json", "masks", "mot.txt", "mp4", "objects.csv", "tracks.npz"]
+    made = [f"{name}.ifs.{kind}" for name in "ab" for kind in kinds]
+    assert sorted(path.name for path in out.iterdir()) == [*made, "index.html", "index.json"]
+    assert sorted(links(out / "index.html")) == made
+    assert len(list((out / "a.ifs.masks").iterdir())) == 2
+    (inputs / "c.mp4").unlink()
+    capsys.readouterr()
+    assert run(inputs, *options) == 0
+    assert "2 of 2 inputs are done already" in capsys.readouterr().out
+    shutil.rmtree(out / "a.ifs.masks")
+    assert run(inputs, *options) == 0
+    assert "1 of 2 inputs are done already" in capsys.readouterr().out
+    assert len(list((out / "a.ifs.masks").iterdir())) == 2
+
+
 def quick(job, told, progress=None) -> Outcome:
     """Writes all files of a job, with nothing in them."""
     places = (job.output, job.labels, job.products.report, job.products.summary)
@@ -137,7 +157,10 @@ def test_several_inputs_stay_beside_themselves_without_a_folder(inputs):
     ("arguments", "complaint"),
     [
         (["a.mp4", "x/a.avi", "-o", "out/"], "two inputs would be written there"),
-        (["a.mp4", "-o", "out/", "--report", "r.html"], "--labels and the like name one file"),
+        (
+            ["a.mp4", "-o", "out/", "--report", "r.html"],
+            "--report r.html would name one place for every input",
+        ),
         (["a.mp4", "b.mp4", "-o", "c.gif"], "would name one file for several inputs"),
         (["-", "-o", "out/"], "standard input has no name"),
         (["a.mp4", "--jobs", "0"], "--jobs: '0' is not a whole number"),

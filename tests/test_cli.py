@@ -109,6 +109,25 @@ def test_where_things_are_written(arguments, output, labels):
     assert (str(job.output), str(job.labels)) == (output, labels)
 
 
+def test_further_outputs_without_a_place_go_beside_the_overlay():
+    options = ["--objects", "--mot", "--json", "--masks", "--tracks", "--clips", "--report"]
+    (job,) = parse(["a.mp4", "-o", "d/b.mkv", *options]).jobs
+    assert job.products == ifsvideo.Products(
+        objects=Path("d/b.objects.csv"),
+        mot=Path("d/b.mot.txt"),
+        summary=Path("d/b.json"),
+        masks=Path("d/b.masks"),
+        tracks=Path("d/b.tracks.npz"),
+        clips=Path("d/b.clips"),
+        report=Path("d/b.html"),
+    )
+    (job,) = parse(["a.mp4", "--masks", ".", "--mot"]).jobs
+    assert job.products == ifsvideo.Products(masks=Path(), mot=Path("a.ifs.mot.txt"))
+    first, tracks = parse(["a.mp4", "t.npz", "--clips", "--objects"]).jobs
+    assert first.products == ifsvideo.Products(objects=Path("a.ifs.objects.csv"), clips=Path("a.ifs.clips"))
+    assert tracks.products == ifsvideo.Products(objects=Path("t.ifs.objects.csv"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
@@ -130,7 +149,9 @@ def test_where_things_are_written(arguments, output, labels):
         (["a.mp4", "--config", "none.toml"], "none.toml: cannot be read"),
         (["a.mp4", "-o", ""], "-o needs the name of a file"),
         (["a.mp4", "b.mp4", "-o", "c.mp4"], "name one file"),
-        (["a.mp4", "b.mp4", "--clips", "c"], "name one file"),
+        (["a.mp4", "b.mp4", "--clips", "c"], "write --clips alone, behind the inputs"),
+        (["a.mp4", "b.mp4", "--labels", "c.csv"], "--labels c.csv would name one place for every input"),
+        (["--mot", "a.mp4"], "required: INPUT"),
         (["a.mp4", "a.avi"], "a.ifs.csv: two inputs"),
     ],
 )

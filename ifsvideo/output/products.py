@@ -22,6 +22,16 @@ from ifsvideo.types import Image, Result, Scene, Sink, VideoInfo
 
 ENDINGS = {"objects": ".csv", "mot": ".txt", "summary": ".json", "tracks": ".npz", "report": ".html"}
 """How the files end."""
+BESIDE = {
+    "objects": ".objects.csv",
+    "mot": ".mot.txt",
+    "summary": ".json",
+    "tracks": ".tracks.npz",
+    "report": ".html",
+    "masks": ".masks",
+    "clips": ".clips",
+}
+"""What stands behind the overlay's name, in place of its ending, where nobody says where an output goes."""
 FOLDERS = {"masks": masks.OWN_FILES, "clips": event_clips.OWN_FILES}
 """Pattern of what an earlier run wrote into the folders."""
 

@@ -9,8 +9,20 @@ from typing import Any
 from ifsvideo.output.legend import clock
 from ifsvideo.report.page import beside, filled
 
-_KINDS = {".mp4": "overlay", ".mov": "overlay", ".csv": "labels", ".json": "summary"}
-"""What a file is called, by its ending."""
+_KINDS = {
+    ".html": "report",
+    ".video.mp4": "",
+    ".json": "summary",
+    ".objects.csv": "objects",
+    ".mot.txt": "MOT",
+    ".tracks.npz": "tracks",
+    ".masks": "masks",
+    ".clips": "clips",
+    ".mp4": "overlay",
+    ".mov": "overlay",
+    ".csv": "labels",
+}
+"""What a file is called, by its ending, the longer ones first; a report's own video is not linked."""
 
 
 def index_page(clips: Mapping[str, Mapping[str, Any]]) -> str:
@@ -52,12 +64,8 @@ def _contact(shortest: Sequence[float] | None, report: str | None) -> str:
 
 
 def _kind(file: str) -> str:
-    """What a file is; empty for a report's own video."""
-    if file.endswith(".html"):
-        return "report"
-    if file.endswith(".video.mp4"):
-        return ""
-    return _KINDS.get(file[file.rfind(".") :], file)
+    """What a file is; empty for what is not linked."""
+    return next((kind for ending, kind in _KINDS.items() if file.endswith(ending)), file)
 
 
 def _link(file: str, text: str, of: str = "") -> str:
