@@ -149,14 +149,14 @@ class Pipeline:
         watch = Stopwatch()
         census, table = Census(), TableSink()
         with Outputs() as outputs:
-            further = ProductsSink(products, clip.info, clip.path, outputs)
+            sound = clip.path if audio and clip.info.has_audio else None
+            further = ProductsSink(products, clip.info, clip.path, outputs, sound)
             sinks: list[Sink] = [census]
             sinks += [table] if keep_table else []
             sinks += [further] if any(products.named()) else []
             if csv is not None:
                 sinks.append(LabelSink(csv, outputs))
             if video is not None:
-                sound = clip.path if audio and clip.info.has_audio else None
                 overlay = OverlaySink(video, clip.info, self.renderer, outputs, sound, self.config.overlay)
                 sinks.append(overlay)
             with self._tracked(clip, mask, watch) as steps, self._segmenting(clip, motions, watch) as label:

@@ -56,6 +56,13 @@ def encode(path: Path, images: list[np.ndarray], *options: str) -> Path:
     return path
 
 
+def tone(path: Path, seconds: float) -> Path:
+    """A file of sound alone."""
+    source = f"aevalsrc='0.3*sin(6283*t)':d={seconds}:s=44100"
+    subprocess.run([FFMPEG, "-v", "error", "-f", "lavfi", "-i", source, str(path)], check=True)
+    return path
+
+
 @pytest.fixture(scope="session")
 def clips(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Clips that work, by name."""

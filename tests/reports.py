@@ -55,13 +55,19 @@ def scenes(movers: Sequence[Mover], frames: int) -> Iterator[Scene]:
 
 
 def make_report(
-    path: Path, movers: Sequence[Mover], frames: int, *, name: str = "clip.mp4", pictures: bool = True
+    path: Path,
+    movers: Sequence[Mover],
+    frames: int,
+    *,
+    name: str = "clip.mp4",
+    pictures: bool = True,
+    sound: Path | None = None,
 ) -> Path:
-    """Write the page of such a clip."""
+    """Write the page of such a clip; ``sound`` is a file whose sound it has."""
     wall = texture(INFO.height, INFO.width, 3)
     with Outputs() as outputs:
         history = ObjectHistory(INFO, thumbnails=True)
-        report = ReportSink(path, name, INFO, history, outputs)
+        report = ReportSink(path, name, INFO, history, outputs, sound)
         for scene in scenes(movers, frames):
             image = np.roll(wall, scene.frame, axis=1) if pictures else None
             history.add(scene, image)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import subprocess
 from fractions import Fraction
 
 import numpy as np
@@ -22,7 +23,7 @@ from ifsvideo.report.pairs import Pairs
 from ifsvideo.report.shapes import DIRECTIONS, outline, steady
 from ifsvideo.types import VideoInfo
 
-from .conftest import decoded
+from .conftest import FFMPEG, decoded, tone
 from .reports import INFO, Mover, history_of, make_report, scenes
 
 
@@ -118,7 +119,7 @@ def test_a_failure_leaves_neither_page_nor_video(tmp_path, monkeypatch):
     monkeypatch.setattr(sink, "EMBEDDED", 1000)
     (tmp_path / "r.html").write_text("older")
 
-    def broken(*arguments):
+    def broken(*arguments, **named):
         raise RuntimeError("broken")
 
     monkeypatch.setattr(sink, "fill", broken)
@@ -171,6 +172,37 @@ def test_pipeline_writes_the_page(clip, tmp_path):
     told = content((tmp_path / "r.html").read_text())
     assert told["frames"] == 24
     assert len(told["objects"]) == len(result.objects)
+
+
+@pytest.mark.parametrize("room", [sink.EMBEDDED, 0])
+def test_the_page_has_the_sound_of_the_input(clip, tmp_path, monkeypatch, room):
+    monkeypatch.setattr(sink, "EMBEDDED", room)
+    loud = tmp_path / "loud.mp4"
+    join = ["-i", tone(tmp_path / "tone.m4a", 1.2), "-c", "copy", loud]
+    subprocess.run([FFMPEG, "-v", "error", "-i", clip, *join], check=True)
+    page = tmp_path / "r.html"
+    products = Products(report=page)
+    assert ifsvideo.Pipeline().run(loud, products=products).warnings == ()
+    address = re.search(r'<video id="video" src="([^"]*)" controls playsinline', page.read_text())
+    assert address
+    video = tmp_path / "r.video.mp4"
+    if room:
+        video.write_bytes(base64.b64decode(address[1].partition("base64,")[2]))
+    said = subprocess.run([FFMPEG, "-i", video], capture_output=True, text=True, check=False).stderr
+    assert "Audio: aac" in said
+    assert decoded(video)[0] == 24
+    ifsvideo.Pipeline().run(loud, products=products, audio=False)
+    assert "controls muted playsinline" in page.read_text()
+
+
+def test_sound_that_cannot_be_read_costs_only_the_sound(clip, tmp_path):
+    with Outputs() as outputs:
+        page = sink.ReportSink(tmp_path / "r.html", "c", INFO, ObjectHistory(INFO), outputs, clip)
+        page.add(next(scenes([], 1)), np.zeros((INFO.height, INFO.width, 3), np.uint8))
+        page._history.finish()
+        page.finish()
+    assert page.warnings == (f"{tmp_path / 'r.html'}: the sound of its video could not be kept",)
+    assert "controls muted playsinline" in (tmp_path / "r.html").read_text()
 
 
 def test_places_are_checked_before_any_work(clip, tmp_path):

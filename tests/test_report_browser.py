@@ -9,6 +9,7 @@ import pytest
 
 from . import browser as driven
 from .browser import Browser
+from .conftest import tone
 from .reports import Mover, make_report
 
 pytestmark = pytest.mark.skipif(
@@ -43,6 +44,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     ]
     return {
         "two": make_report(folder / "two & <b>.html", TWO, 60, name='two & <b> "quoted".mp4'),
+        "loud": make_report(folder / "loud.html", TWO, 60, sound=tone(folder / "tone.m4a", 3.0)),
         "none": make_report(folder / "none.html", [], 12),
         "crowd": make_report(folder / "crowd.html", crowd, 32),
         "tracks": make_report(folder / "tracks.html", TWO, 60, pictures=False),
@@ -194,6 +196,19 @@ def test_an_address_can_name_a_moment(window, pages):
 def test_names_from_outside_are_text(page):
     assert page.run("return document.querySelector('h1').textContent") == 'two & <b> "quoted".mp4'
     assert page.run("return document.querySelectorAll('h1 b').length") == 0
+
+
+def test_sound_is_heard_and_switched_off(window, pages):
+    show(window, pages["loud"])
+    window.click("#play")
+    window.until("return document.getElementById('video').webkitAudioDecodedByteCount > 0")
+    muted = "return document.getElementById('video').muted"
+    assert window.run(muted) is False
+    window.click("#sound")
+    assert window.run(muted) is True
+    assert window.complaints() == []
+    show(window, pages["two"])
+    assert window.run("return document.getElementById('sounding').offsetWidth") == 0
 
 
 def test_no_object(window, pages):

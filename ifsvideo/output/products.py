@@ -120,6 +120,8 @@ class ProductsSink:
         The input, where it was read from disk; clips are cut out of it.
     outputs : Outputs
         Group with which all of it is placed.
+    sound : Path, optional
+        File whose sound the page's video has.
 
     Attributes
     ----------
@@ -128,7 +130,14 @@ class ProductsSink:
         Complete after `finish`.
     """
 
-    def __init__(self, products: Products, info: VideoInfo, source: Path | None, outputs: Outputs) -> None:
+    def __init__(
+        self,
+        products: Products,
+        info: VideoInfo,
+        source: Path | None,
+        outputs: Outputs,
+        sound: Path | None = None,
+    ) -> None:
         self.history = ObjectHistory(info, thumbnails=products.report is not None)
         self._products = products
         self._source = source
@@ -139,7 +148,7 @@ class ProductsSink:
         tracks = TracksSink(products.tracks, info, outputs) if products.tracks else None
         name = source.resolve().name if source else "Tracks"
         page = products.report
-        self._report = ReportSink(page, name, info, self.history, outputs) if page else None
+        self._report = ReportSink(page, name, info, self.history, outputs, sound) if page else None
         sinks = (self.history, self._masks, tracks, self._report)
         self._sinks: list[Sink] = [sink for sink in sinks if sink is not None]
 
@@ -151,7 +160,7 @@ class ProductsSink:
     @property
     def warnings(self) -> tuple[str, ...]:
         """See the class."""
-        return self._masks.warnings if self._masks else ()
+        return tuple(text for sink in (self._masks, self._report) if sink for text in sink.warnings)
 
     def add(self, scene: Scene, image: Image | None) -> None:
         """See `ifsvideo.types.Sink`."""

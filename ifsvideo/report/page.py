@@ -19,7 +19,7 @@ _SCRIPT = ("data", "player", "drawing", "timeline", "table", "plots", "approach"
 _PLACE = re.compile(r"<!--(\w+)-->|/\*(\w+)\*/")
 
 
-def fill(name: str, facts: str, data: Mapping[str, Any], video: str) -> str:
+def fill(name: str, facts: str, data: Mapping[str, Any], video: str, *, sound: bool = False) -> str:
     """The page as text.
 
     Parameters
@@ -32,9 +32,12 @@ def fill(name: str, facts: str, data: Mapping[str, Any], video: str) -> str:
         For the script, as JSON.
     video : str
         Address of the video (`embedded` or `beside`), empty where there is none.
+    sound : bool
+        Whether it has sound; the script finds out by its being muted or not.
     """
+    muted = "" if sound else " muted"
     player = (
-        f'<video id="video" src="{html.escape(video)}" controls muted playsinline preload="auto"></video>'
+        f'<video id="video" src="{html.escape(video)}" controls{muted} playsinline preload="auto"></video>'
     )
     parts = {
         "title": html.escape(name),

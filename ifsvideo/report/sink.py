@@ -50,9 +50,13 @@ class ReportSink:
         With thumbnails; it is fed and finished before this sink.
     outputs : Outputs
         Group with which the page is placed.
+    sound : Path, optional
+        File whose sound the page's video has.
 
     Attributes
     ----------
+    warnings : tuple of str
+        What a user should know; known after `finish`.
     beside : Path or None
         The video, where it stands beside the page; known after `finish`.
 
@@ -65,10 +69,17 @@ class ReportSink:
     wants_image = True
 
     def __init__(
-        self, path: Path, name: str, info: VideoInfo, history: ObjectHistory, outputs: Outputs
+        self,
+        path: Path,
+        name: str,
+        info: VideoInfo,
+        history: ObjectHistory,
+        outputs: Outputs,
+        sound: Path | None = None,
     ) -> None:
         self._path, self._name, self._info, self._history = path, name, info, history
-        self._outputs = outputs
+        self._outputs, self._sound = outputs, sound
+        self.warnings: tuple[str, ...] = ()
         self._unfinished = outputs.add(path)
         self._diagonal = float(np.hypot(info.width, info.height))
         self._every = max(1, round(float(info.fps) / _SHAPES_PER_S))
@@ -88,7 +99,7 @@ class ReportSink:
             self._pairs.add(scene.frame // self._pairs_every, scene)
         if image is not None:
             if self._video is None:
-                self._video = _PageVideo(self._path, self._info, self._outputs)
+                self._video = _PageVideo(self._path, self._info, self._outputs, self._sound)
             self._video.write(image)
         self._frames = scene.frame + 1
 
@@ -101,7 +112,10 @@ class ReportSink:
         address = ""
         if self._video is not None:
             address, self.beside = self._video.finish()
-        page = fill(self._name, self._facts(), data, address)
+        sounds = self._video is not None and self._video.sounds
+        if self._sound and not sounds:
+            self.warnings = (f"{self._path}: the sound of its video could not be kept",)
+        page = fill(self._name, self._facts(), data, address, sound=sounds)
         try:
             self._unfinished.write_text(page, encoding="utf-8", newline="\n")
         except OSError as error:
@@ -117,7 +131,7 @@ class ReportSink:
 class _PageVideo:
     """The plain pictures, small, as H.264, to be put into the page or beside it."""
 
-    def __init__(self, page: Path, info: VideoInfo, outputs: Outputs) -> None:
+    def __init__(self, page: Path, info: VideoInfo, outputs: Outputs, sound: Path | None) -> None:
         self._place = video_beside(page)
         self._outputs = outputs
         self._scratch = outputs.add_scratch(self._place)
@@ -127,13 +141,20 @@ class _PageVideo:
         self._size = (2 * max(1, round(shrink * width / 2)), 2 * max(1, round(shrink * height / 2)))
         small = replace(info, width=self._size[0], height=self._size[1], sample_aspect=info.sample_aspect**0)
         self._open = outputs.enter(ExitStack())
-        self._writer = self._open.enter_context(VideoWriter(self._scratch, small, for_page=True))
+        writer = VideoWriter(self._scratch, small, audio_from=sound, for_page=True)
+        self._writer = self._open.enter_context(writer)
+        self._wanted = sound is not None
 
     def write(self, image: Image) -> None:
         small = image
         if image.shape[1::-1] != self._size:
             small = np.asarray(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), np.uint8)
         self._writer.write(small)
+
+    @property
+    def sounds(self) -> bool:
+        """Whether it has sound; known after `finish`."""
+        return self._wanted and not self._writer.warnings
 
     def finish(self) -> tuple[str, Path | None]:
         """Complete it; the address by which the page finds it, and where it stands if not in the page."""

@@ -24,6 +24,7 @@ $("play").addEventListener("click", toggle);
 $("back").addEventListener("click", () => step(-1));
 $("forward").addEventListener("click", () => step(1));
 $("speed").addEventListener("change", () => { player.playbackRate = Number($("speed").value); });
+$("sound").addEventListener("change", () => { video.muted = !$("sound").checked; });
 for (const id of ["outlines", "boxes", "paths"]) $(id).addEventListener("change", () => draw(player.currentTime));
 document.addEventListener("keydown", event => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("input, select, button")) return;

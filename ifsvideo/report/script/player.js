@@ -26,6 +26,7 @@ stage.style.aspectRatio = String(ratio);
 stage.style.maxWidth = `calc(70vh * ${ratio})`;
 if (video) {
   video.removeAttribute("controls");
+  $("sounding").hidden = video.muted;
   video.addEventListener("error", () => {
     stage.after(make("p", {className: "help", role: "alert",
       textContent: "The video cannot be played; keep the file that was written beside this page in the same folder."}));
