@@ -121,10 +121,10 @@ class AnimationWriter(FedWriter):
         """Keep the frames as they are."""
         self._kept = self._own.add_scratch(self._target.with_suffix(".mkv"))
         self._palette = self._own.add_scratch(self._target.with_suffix(".png"))
-        pixels = "bgra" if self._transparent else "bgr0"
+        given, kept = ("rgba", "bgra") if self._transparent else ("rgb24", "bgr0")
         return [
-            *self._input(self._info.width, self._info.height),
-            *("-c:v", "ffv1", "-level", "3", "-pix_fmt", pixels),
+            *self._input(self._info.width, self._info.height, given),
+            *("-c:v", "ffv1", "-level", "3", "-pix_fmt", kept),
             *("-f", "matroska", "-y", ffmpeg.file_url(self._kept)),
         ]
 

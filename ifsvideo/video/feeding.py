@@ -53,9 +53,9 @@ class FedWriter(ABC):
     def _complete(self) -> None:
         """Make the target complete, once that ffmpeg has ended well."""
 
-    def _padded(self, image: Image) -> Image:
+    def _as_fed(self, image: Image) -> Image:
         """The picture as ffmpeg is given it."""
-        return image
+        return np.ascontiguousarray(image)
 
     def __enter__(self) -> Self:
         self._own = Outputs()
@@ -86,7 +86,7 @@ class FedWriter(ABC):
         expected = (self._info.height, self._info.width, 4 if self._transparent else 3)
         if image.shape != expected or image.dtype != np.uint8:
             raise ValueError(f"expected uint8 image of shape {expected}, got {image.dtype} {image.shape}")
-        pixels = np.ascontiguousarray(self._padded(image))
+        pixels = self._as_fed(image)
         try:
             self._child.stdin.write(pixels.data.cast("B"))
         except OSError:
@@ -127,9 +127,8 @@ class FedWriter(ABC):
             self._child.stop()
             self._own.__exit__(kind, error, trace)
 
-    def _input(self, width: int, height: int) -> list[str]:
-        """Arguments that tell ffmpeg what it is fed."""
-        pixels = "rgba" if self._transparent else "rgb24"
+    def _input(self, width: int, height: int, pixels: str) -> list[str]:
+        """Arguments that tell ffmpeg what it is fed; ``pixels`` is its name of their format."""
         return [
             *("-loglevel", "error", "-f", "rawvideo", "-pix_fmt", pixels),
             *("-video_size", f"{width}x{height}", "-framerate", str(self._info.fps), "-i", "pipe:0"),

@@ -14,6 +14,7 @@ from ifsvideo.output.atomic import Outputs, check_writable
 from ifsvideo.types import Image, VideoInfo
 from ifsvideo.video import animation, ffmpeg
 from ifsvideo.video.feeding import FedWriter
+from ifsvideo.video.picture import planes_of
 from ifsvideo.video.probe import audio_codec, count_frames
 
 FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
@@ -27,10 +28,7 @@ _COPIED_SOUND = {
 _ENCODER = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-threads", "2"]
 _ENCODER_FOR_PAGES = ["-c:v", "libx264", "-preset", "superfast", "-crf", "27", "-g", "15", "-threads", "2"]
 # One matrix for every size, and the tags that say so: players guess by the size where tags are missing.
-_COLOURS = (
-    "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p,"
-    "setparams=range=tv:colorspace=bt709:color_primaries=bt709:color_trc=bt709"
-)
+_COLOURS = "setparams=range=tv:colorspace=bt709:color_primaries=bt709:color_trc=bt709"
 
 
 def check_output(
@@ -130,10 +128,12 @@ class VideoWriter(FedWriter):
         """Whether an odd side is padded by one pixel (a repetition of the last row or column)."""
         return any(self._pad)
 
-    def _padded(self, image: Image) -> Image:
-        if not self.padded:
-            return image
-        return np.pad(image, ((0, self._pad[0]), (0, self._pad[1]), (0, 0)), mode="edge")
+    def _as_fed(self, image: Image) -> Image:
+        if self._transparent:
+            return super()._as_fed(image)
+        if self.padded:
+            image = np.pad(image, ((0, self._pad[0]), (0, self._pad[1]), (0, 0)), mode="edge")
+        return planes_of(super()._as_fed(image))
 
     def _complete(self) -> None:
         """Add the sound, make sure that all is there."""
@@ -147,11 +147,11 @@ class VideoWriter(FedWriter):
         # With sound, the pictures go to a file of their own first: the length is known only at the end.
         self._pictures = self._own.add_scratch(self._target) if self._audio_from else self._target
         filters = f"setsar=sar={self._info.sample_aspect}:max=65535"
-        encoder = ["-c:v", "qtrle", "-pix_fmt", "argb"]
+        pixels, encoder = "rgba", ["-c:v", "qtrle", "-pix_fmt", "argb"]
         if not self._transparent:
-            filters, encoder = f"{_COLOURS},{filters}", self._encoder
+            pixels, filters, encoder = "yuv420p", f"{_COLOURS},{filters}", self._encoder
         return [
-            *self._input(self._info.width + self._pad[1], self._info.height + self._pad[0]),
+            *self._input(self._info.width + self._pad[1], self._info.height + self._pad[0], pixels),
             *("-vf", filters, *encoder, "-fps_mode", "passthrough"),
             *self._destination(self._pictures),
         ]
