@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ Patches = NDArray[np.float32]
 """(N, K) float32: the pixels of N patches, each of mean 0 and length 1 (0 where there is no contrast)."""
 
 
+@cache
 def grid(radius: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Offsets x and y (K,) of a patch's pixels from its centre, row by row."""
     y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1).astype(np.float32)
