@@ -166,7 +166,7 @@ class TestDrives:
         assert {kind for kind, _ in told} == {"appears", "overtakes"}
 
     def test_a_car_that_is_overtaken(self):
-        told = kinds(drive(lambda t: (3.2, 24.0 + 4.0 * t, 0.0)))
+        told = kinds(drive(lambda t: (3.2, 18.0 + 6.0 * t, 0.0)))
         assert ("is overtaken", "object 1 is overtaken, on the right") in told
         assert ("leaves", "object 1 leaves on the right") in told
         assert "overtakes" not in {kind for kind, _ in told}
@@ -197,7 +197,7 @@ class TestDrives:
             replace(
                 scene,
                 frame=scene.frame + len(first),
-                time_s=scene.time_s + 1.5,
+                time_s=INFO.time_of(scene.frame + len(first)),
                 ids=scene.ids + 1_000_000,
                 labels=2 * scene.labels,
             )
@@ -206,7 +206,7 @@ class TestDrives:
         told = history([*first, *moved]).events
         assert [(event.time_s, event.text) for event in told] == [
             (0.0, "object 1 is in sight at the beginning"),
-            (1.5, "object 2 is in sight at the beginning of a shot"),
+            (1.52, "object 2 is in sight at the beginning of a shot"),
         ]
 
     def test_a_car_that_stops_and_starts(self):
@@ -218,8 +218,46 @@ class TestDrives:
         ]
         assert [event.time_s for event in told] == pytest.approx([1.0, 3.5], abs=0.1)
 
+    def test_what_is_known_late_is_told_of_the_time_since_which_it_is_in_sight(self):
+        told = history(
+            drive(lambda t: (-3.0, 60.0 - 8.0 * t, 0.0), label=lambda t: int(0.7 < t < 2.3), seconds=4.0)
+        ).events
+        assert [event.kind for event in told] == ["appears", "comes closer fast", "leaves"]
+        assert told[0].text == "object 1 is in sight at the beginning"
+        assert [event.time_s for event in told] == pytest.approx([0.0, 0.0, 2.87], abs=0.1)
+
+    def test_what_stood_before_is_not_said_to_come_closer_since_then(self):
+        where = lambda t: (-2.0, 70.0 - 14.0 * max(0.0, t - 1.2) ** 2, 0.0)  # noqa: E731
+        told = history(drive(where, seconds=2.8, label=lambda t: int(t > 1.3), speed=3.0)).events
+        assert [event.kind for event in told][:2] == ["appears", "comes closer fast"]
+        assert told[0].text == "object 1 starts to move"
+        assert told[1].time_s > 1.7
+
+    def test_what_comes_in_too_fast_to_be_noticed_came_over_the_edge(self):
+        told = history(
+            drive(lambda t: (-16.0 + 10.0 * t, 18.0, math.pi / 2), speed=0.0, hidden=lambda t: t < 0.9)
+        ).events
+        assert [event.text for event in told] == [
+            "object 1 appears on the left",
+            "object 1 crosses from left to right",
+            "object 1 leaves on the right",
+        ]
+        assert told[0].time_s == pytest.approx(0.65, abs=0.15), "when it was wholly in the picture"
+
+    def test_a_car_that_crosses_while_we_drive_is_not_overtaken(self):
+        told = kinds(drive(lambda t: (-14.0 + 9.5 * t, 26.0, math.pi / 2), speed=3.0))
+        assert [kind for kind, _ in told] == ["appears", "crosses", "leaves"]
+
+    def test_another_number_for_the_same_tracks_is_no_event(self):
+        told = kinds(drive(lambda t: (0.3, 15.0 + 12.0 * t, 0.0), label=lambda t: 1 if t < 2 else 2))
+        assert told == [("appears", "object 1 is in sight at the beginning")]
+
+    def test_a_label_that_is_lost_while_the_tracks_go_on_is_no_event(self):
+        told = kinds(drive(lambda t: (0.3, 15.0 + 12.0 * t, 0.0), label=lambda t: int(not 1.5 < t < 2.3)))
+        assert told == [("appears", "object 1 is in sight at the beginning")]
+
     def test_every_kind_of_event_is_known(self):
-        told = drive(lambda t: (-3.0, 75.0 - 12.0 * t, 0.0)), drive(lambda t: (3.2, 24.0 + 4.0 * t, 0.0))
+        told = drive(lambda t: (-3.0, 75.0 - 12.0 * t, 0.0)), drive(lambda t: (3.2, 18.0 + 6.0 * t, 0.0))
         assert {kind for scenes in told for kind, _ in kinds(scenes)} <= set(KINDS)
 
 

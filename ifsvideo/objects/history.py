@@ -14,7 +14,7 @@ from ifsvideo.objects.boxes import point_box, steady_boxes
 from ifsvideo.objects.contact import contact, stretch
 from ifsvideo.objects.events import Sights, events_of, split
 from ifsvideo.objects.kinematics import foot_step, steps, velocity
-from ifsvideo.objects.standing import Standing
+from ifsvideo.objects.margins import Margin, Margins
 from ifsvideo.objects.table import Event, ObjectTable
 from ifsvideo.types import BACKGROUND, FramePoints, Image, Scene, VideoInfo
 
@@ -71,7 +71,7 @@ class ObjectHistory:
         self._info = info
         self._diagonal = float(np.hypot(info.width, info.height))
         self._before = FramePoints(np.empty(0, np.int64), np.empty((0, 2), np.float32))
-        self._standing = Standing(float(info.fps))
+        self._margins = Margins(float(info.fps))
         self._frames = 0
         self._shots: list[int] = []
         self._sights: dict[int, array[float]] = {}
@@ -96,12 +96,13 @@ class ObjectHistory:
         if len(scene.ids) and not known.any():
             self._shots.append(scene.frame)
         self._before = FramePoints(scene.ids, scene.xy)
-        self._standing.add(scene)
+        self._margins.add(scene)
         self._frames += 1
 
     def finish(self) -> None:
         """Make the table and the events."""
         self._shots.append(self._frames)
+        self._margins.finish()
         tables: list[ObjectTable] = []
         found: list[Event] = []
         for number, numbers in self._sights.items():
@@ -137,15 +138,18 @@ class ObjectHistory:
     def _events(self, rows: ObjectTable, sights: NDArray[Any]) -> Iterator[Event]:
         """What happened to one object."""
         shots = np.array(self._shots)
-        for part in split(rows.frame, float(self._info.fps)):
+        margins, number = self._margins, int(rows.object[0])
+        # Tracks that go on all through a gap say that the object did not go.
+        bridged = {first: margin.frames for (own, first), margin in margins.before.items() if own == number}
+        for part in split(rows.frame, float(self._info.fps), bridged):
             seen = rows.select(np.arange(len(rows))[part])
-            first, last, number = int(seen.frame[0]), int(seen.frame[-1]), int(seen.object[0])
+            first, last = int(seen.frame[0]), int(seen.frame[-1])
             one = Sights(
                 seen,
                 sights["foot"][part],
                 np.hypot(*sights["around"][part].T),
-                self._standing.before.get((number, first), 0.0),
-                self._standing.after.get((number, last), 0.0),
+                margins.before.get((number, first), Margin()),
+                margins.after.get((number, last), Margin()),
                 again=part.start > 0,
                 shot=(int(shots[shots <= first][-1]), int(shots[shots > last][0])),
             )
