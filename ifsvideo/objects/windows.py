@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ifsvideo.config import ObjectsConfig
+from ifsvideo.objects.standing_camera import add_movers
 from ifsvideo.types import BACKGROUND, UNDECIDED, Bools, FramePoints, Segmenter, Tracks
 
 _REACH = 35.0
@@ -128,7 +129,10 @@ class WindowLabeller:
             return np.full(tracks.points, UNDECIDED, dtype=np.int64)
         labels = self.segmenter.segment(tracks.select(lasting), self.motions).labels
         unit = float(np.hypot(*tracks.size)) / 800 if tracks.size else 1.0
-        return follow_neighbours(tracks, lasting, labels, unit)
+        labels = follow_neighbours(tracks, lasting, labels, unit)
+        if self.motions is None:
+            labels = add_movers(tracks, lasting, labels, unit)
+        return labels
 
 
 def follow_neighbours(
