@@ -51,9 +51,9 @@ class Clip:
         rows = np.flatnonzero(np.isin(self.points.ids, self.ground) & (self.points.frame == 10))
         return self.points.ids[rows[np.argsort(away[rows])]]
 
-    def sent_home(self) -> set[int]:
+    def sent_home(self, fps: float | None = None) -> set[int]:
         """Tracks that the check takes from the object, in all their rows."""
-        check = FigureGround()
+        check = FigureGround(fps=fps)
         labels = np.where(np.isin(self.points.ids, self.ground), 0, 1)
         for frame, grey in enumerate(self.greys):
             rows = self.points.frame == frame
@@ -115,6 +115,16 @@ def test_points_outside_the_outline_that_ride_along_go_to_the_ground(contrast) -
     where the ground is not covered a moment later or earlier, it fits better."""
     clip = sliding_square(contrast=contrast)
     assert clip.sent_home() == set(clip.outside.tolist())
+
+
+def test_pictures_are_compared_over_the_same_time_at_any_rate() -> None:
+    """At a low rate no frames so many apart are asked: what is on the object has changed by then."""
+    clip = sliding_square()
+    assert FigureGround(fps=30.0).lags == (2, 4, 6) == FigureGround().lags
+    assert FigureGround(fps=10.0).lags == (1, 2)
+    assert FigureGround(fps=1.0).lags == (1,)
+    assert FigureGround(fps=120.0).lags[-1] == 24
+    assert clip.sent_home(15.0) == set(clip.outside.tolist())
 
 
 def test_large_pictures_are_looked_at_as_the_tracker_does(monkeypatch) -> None:

@@ -26,8 +26,8 @@ from ifsvideo.tracking.tracker import shrunk, tracked_size
 from ifsvideo.types import BACKGROUND, FramePoints, Image, Ints
 from ifsvideo.video.picture import Picture
 
-_LAGS = (2, 4, 6)
-"""Frames between the pictures that are compared: few enough that neither object nor ground changes its looks,
+_LAGS_S = (0.07, 0.13, 0.2)
+"""Seconds between the pictures that are compared: so few that neither object nor ground changes its looks,
 several, so that in one of them the two have parted."""
 _RADIUS = 1
 """Half side of the patch less half a pixel: 3x3 pixels, for points 2 px off the outline. As KLT's window it
@@ -45,6 +45,9 @@ _LEAST_GROUND = 8
 """Fewest tracks of the ground that two frames must share."""
 _LEAST_ROWS = 3
 """Fewest observations by which a track is judged."""
+_FEW_ROWS = 4.0
+"""Observations at which half of the ratio above one is asked for: few tell that the ground fits better, not
+that it fits as well."""
 _NOISE = 1.0
 """Misfit, grey levels, that noise alone leaves: where neither side's is larger, nothing can be told. Added to
 both, so that two small ones count as nearly equal."""
@@ -85,6 +88,8 @@ class FigureGround:
     ----------
     scale : float
         Share of the picture's size in which it was tracked.
+    fps : float, optional
+        Frames a second; 30 where nobody told.
 
     Examples
     --------
@@ -96,9 +101,11 @@ class FigureGround:
         off = np.isin(points.ids, check.on_ground(1.65))
     """
 
-    def __init__(self, scale: float = 1.0) -> None:
+    def __init__(self, scale: float = 1.0, fps: float | None = None) -> None:
         self._scale = scale
-        self._recent: deque[_Seen] = deque(maxlen=max(_LAGS) + 1)
+        self.lags = tuple(sorted({max(1, round(lag * (fps or 30.0))) for lag in _LAGS_S}))
+        """The same in frames."""
+        self._recent: deque[_Seen] = deque(maxlen=self.lags[-1] + 1)
         self._ids = np.empty(0, np.int64)
         self._sums = np.empty((0, 3))
         """Of each of these tracks: rows, and the sums of the roots of their misfits to object and ground."""
@@ -116,7 +123,7 @@ class FigureGround:
         if len(self._recent) == self._recent.maxlen:
             self._ids, self._sums = self._with_rows_of([self._recent[0]])
         self._recent.append(_Seen(picture, points, labels, self._scale))
-        for lag in _LAGS:
+        for lag in self.lags:
             if lag < len(self._recent):
                 _compare(self._recent[-1 - lag], self._recent[-1])
                 _compare(self._recent[-1], self._recent[-1 - lag])
@@ -133,7 +140,8 @@ class FigureGround:
         rows = sums[:, 0]
         to_object, to_ground = np.square(sums[:, 1:] / np.maximum(rows, 1)[:, None]).T
         can_tell = (rows >= _LEAST_ROWS) & (np.maximum(to_object, to_ground) > _NOISE)
-        shows_ground = can_tell & (to_ground + _NOISE < least_ratio * (to_object + _NOISE))
+        ratio = 1 + (least_ratio - 1) * rows / (rows + _FEW_ROWS)
+        shows_ground = can_tell & (to_ground + _NOISE < ratio * (to_object + _NOISE))
         return np.asarray(ids[shows_ground], np.int64)
 
     def forget(self, alive: NDArray[np.int64]) -> None:

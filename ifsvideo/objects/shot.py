@@ -107,7 +107,7 @@ class Shot:
         self._window_size = WindowSize.at(fps, config)
         self._windows = Windows(self._window_size)
         self._fixed = CameraFixed(size, fps, config)
-        self._borders = FigureGround(scale)
+        self._borders = FigureGround(scale, fps)
         longest_loss = config.longest_loss_s * (fps or 30.0)
         self._linker = Linker(config.least_shared, config.least_windows, longest_loss)
         self._least_windows = config.least_windows
