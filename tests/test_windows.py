@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.objects.windows import follow_neighbours, window_bounds
+from ifsvideo.objects.windows import follow_all_round, follow_neighbours, window_bounds
 from ifsvideo.types import Tracks
 
 CONFIG = ObjectsConfig()
@@ -90,6 +90,23 @@ def test_a_single_sight_has_no_motion_to_compare() -> None:
     xy[1:, 0] = np.nan
     decided = np.flatnonzero(tracks.visible.all(axis=0))
     assert follow_neighbours(Tracks.from_array(xy), decided, kind[decided], 1.0)[0] == -1
+
+
+def seen_once(label_of_the_last: int, far: float = 0.0) -> int:
+    """Label of a point that is seen once, in the middle of four tracks, three of which are background."""
+    around = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [9.0, 9.0], [4.0 + far, 5.0]])
+    xy = np.repeat(around[None], 10, axis=0)
+    visible = np.ones((10, 5), bool)
+    visible[:, 4] = np.arange(10) == 7
+    labels = np.array([0, 0, 0, label_of_the_last, -1])
+    return int(follow_all_round(Tracks.from_array(xy, visible), labels, 1.0)[4])
+
+
+def test_a_single_sight_is_what_is_all_round_it() -> None:
+    assert seen_once(0) == 0
+    assert seen_once(1) == -1  # not all agree
+    assert seen_once(-1) == -1  # not all know
+    assert seen_once(0, far=40.0) == -1  # they are not round it
 
 
 def test_an_objects_label_is_not_carried_far() -> None:

@@ -17,6 +17,8 @@ _REACH = 35.0
 """Distance over which a short track may take an object's label, pixels of a 640x480 picture."""
 _NEIGHBOURS = 8
 """Neighbours that are asked for the label of a short track."""
+_ALL_ROUND = 4
+"""Neighbours that must agree on the label of a track that is seen in a single frame."""
 
 Bounds = tuple[int, int]
 """First and one past the last frame of a window."""
@@ -132,7 +134,7 @@ class WindowLabeller:
         labels = follow_neighbours(tracks, lasting, labels, unit)
         if self.motions is None:
             labels = add_movers(tracks, lasting, labels, unit)
-        return labels
+        return follow_all_round(tracks, labels, unit)
 
 
 def follow_neighbours(
@@ -164,6 +166,32 @@ def follow_neighbours(
         if len(near):
             group = short[middle == frame]
             result[group] = _votes(tracks, group, frame, near, result, unit)
+    return result
+
+
+def follow_all_round(tracks: Tracks, labels: NDArray[np.int64], unit: float) -> NDArray[np.int64]:
+    """Labels of all tracks of a window, those seen in a single frame by what is all round them there.
+
+    Their motion is not known: they take a label only where all of the nearest tracks agree on it.
+
+    Parameters
+    ----------
+    labels : (P,) int
+        Of the tracks; -1 undecided.
+    unit : float
+        Pixels per pixel of a 640x480 picture.
+    """
+    result = labels.copy()
+    single = tracks.visible.sum(axis=0) == 1
+    for frame in np.flatnonzero(tracks.visible[:, single].any(axis=1)).tolist():
+        seen = tracks.visible[frame]
+        asked, near = np.flatnonzero(seen & single), np.flatnonzero(seen & ~single & (labels != UNDECIDED))
+        if len(near) < _ALL_ROUND:
+            continue
+        distance, index = cKDTree(tracks.xy[frame, near]).query(tracks.xy[frame, asked], k=_ALL_ROUND)
+        votes = labels[near[index]]
+        agreed = (np.ptp(votes, axis=1) == 0) & (np.max(distance, axis=1) <= _REACH * unit)
+        result[asked[agreed]] = votes[agreed, 0]
     return result
 
 
