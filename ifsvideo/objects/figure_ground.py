@@ -40,7 +40,7 @@ _REACH = 44.0
 """Farthest that the ground's nearest track may be, pixels of a 640x480 picture: farther off the ground may
 move otherwise, and where it has no texture there is nothing to compare."""
 _NEIGHBOURS = 6
-"""Tracks of the ground whose median motion is taken."""
+"""Tracks of the ground whose median motion is taken; even."""
 _LEAST_GROUND = 8
 """Fewest tracks of the ground that two frames must share."""
 _LEAST_ROWS = 3
@@ -126,7 +126,6 @@ class FigureGround:
         for lag in self.lags:
             if lag < len(self._recent):
                 _compare(self._recent[-1 - lag], self._recent[-1])
-                _compare(self._recent[-1], self._recent[-1 - lag])
 
     def on_ground(self, least_ratio: float) -> NDArray[np.int64]:
         """Tracks (T,), ordered, that were called moving but show the ground.
@@ -163,9 +162,19 @@ class FigureGround:
         return names, total
 
 
-def _compare(here: _Seen, there: _Seen) -> None:
-    """Misfits of the moving points of frame ``here``, by what frame ``there`` shows."""
-    _, row, other = np.intersect1d(here.points.ids, there.points.ids, assume_unique=True, return_indices=True)
+def _compare(one: _Seen, other: _Seen) -> None:
+    """Misfits of the moving points of either frame, by what the other shows."""
+    if not (one.moving.any() or other.moving.any()):
+        return
+    place = np.searchsorted(other.points.ids, one.points.ids)
+    row = np.flatnonzero(np.append(other.points.ids, -1)[place] == one.points.ids)
+    _judge(one, other, row, place[row])
+    _judge(other, one, place[row], row)
+
+
+def _judge(here: _Seen, there: _Seen, row: NDArray[np.intp], other: NDArray[np.intp]) -> None:
+    """Misfits of the moving points of frame ``here``, by what frame ``there`` shows; the tracks that both see
+    stand at ``row`` here and at ``other`` there."""
     ground, moving = here.ground[row], here.moving[row]
     if np.count_nonzero(ground) < _LEAST_GROUND or not moving.any():
         return
@@ -174,8 +183,12 @@ def _compare(here: _Seen, there: _Seen) -> None:
     a = (here.points.xy[row] + 0.5) * scale - 0.5
     b = (there.points.xy[other] + 0.5) * scale - 0.5
     reach = _REACH * math.hypot(*before.shape) / 800
-    distance, nearest = cKDTree(a[ground]).query(a[moving], k=_NEIGHBOURS)
-    with_ground = a[moving] + np.median((b - a)[ground][nearest], axis=1)
+    distance, nearest = cKDTree(a[ground], compact_nodes=False, balanced_tree=False).query(
+        a[moving], k=_NEIGHBOURS
+    )
+    # The median of an even number; numpy's own spends most of its time on checks.
+    middle = np.sort((b - a)[ground][nearest], axis=1)[:, _NEIGHBOURS // 2 - 1 : _NEIGHBOURS // 2 + 1]
+    with_ground = a[moving] + middle.mean(axis=1)
     parted = np.linalg.norm(with_ground - b[moving], axis=1) > _PARTED
     asked = parted & (np.asarray(distance)[:, 0] <= reach)
     rows = row[moving][asked]
