@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -46,6 +46,8 @@ def follow(
 ) -> Generator[Step, None, None]:
     """Track the frames of a clip; those that repeat the one before are not shown to the tracker.
 
+    The pictures come out in the form in which they wait.
+
     Parameters
     ----------
     tracker : Tracker
@@ -81,7 +83,7 @@ def follow(
 
     def repetitions() -> Iterator[Step]:
         while last is not None and shown and shown[0].repeats:
-            yield Step(last.points, shown.popleft().picture, repeats=True)
+            yield Step(last.points, shown.popleft().picture.to_wait(), repeats=True)
 
     with closing(pictures):
         for points in _points(tracker, distinct(), ignore):
@@ -89,8 +91,9 @@ def follow(
             taken += 1
             if not shown:
                 break
-            last = _step(last, ordered(points), shown.popleft())
-            yield last
+            shown_now = shown.popleft()
+            last = _step(last, ordered(points), shown_now)
+            yield replace(last, picture=shown_now.picture.to_wait())
         if taken != given:
             raise ValueError(f"the tracker gave points for {taken} of {given} frames")
         yield from repetitions()

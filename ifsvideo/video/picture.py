@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -20,32 +18,62 @@ _CHANGED_PIXEL = 64
 """Change of a pixel, grey levels, that no encoder makes."""
 
 
-@dataclass(frozen=True, eq=False)
+LARGEST_KEPT = 6_000_000
+"""Bytes of a frame that waits in memory as it is. Some ninety wait for their labels at 30 a second: up to
+2560x1440 they take half a gigabyte."""
+_QUALITY = (
+    cv2.IMWRITE_JPEG_QUALITY,
+    95,
+    cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+    cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+)
+"""Of larger ones: an error of about a grey level, less than the encoder makes of it later."""
+
+
 class Picture:
     """A frame as RGB, or as the planes that the decoder gives: half the bytes, and grey for nothing.
 
-    Attributes
+    Parameters
     ----------
     pixels : uint8
         (H, W, 3) RGB; or (3 H / 2, W), the planes Y, U and V of BT.601, 16 to 235, U and V of half size, one
         after the other (I420); then both sides are even.
     """
 
-    pixels: Image
+    def __init__(self, pixels: Image) -> None:
+        self._kept: Image = pixels
+        self._is_packed = False
+
+    @property
+    def pixels(self) -> Image:
+        """See the parameter."""
+        if not self._is_packed:
+            return self._kept
+        return np.asarray(cv2.imdecode(self._kept, cv2.IMREAD_UNCHANGED), np.uint8)
+
+    def to_wait(self) -> Picture:
+        """The same picture in the form in which it waits: a large one as JPEG, a fifth of the bytes."""
+        if self._is_packed or self._kept.nbytes <= LARGEST_KEPT:
+            return self
+        packed = Picture(np.asarray(cv2.imencode(".jpg", self._kept, _QUALITY)[1], np.uint8))
+        packed._is_packed = True
+        return packed
 
     @property
     def rgb(self) -> Image:
         """(H, W, 3) uint8, made anew from planes."""
-        if self.pixels.ndim == 3:
-            return self.pixels
-        return np.asarray(cv2.cvtColor(self.pixels, cv2.COLOR_YUV2RGB_I420), np.uint8)
+        pixels = self.pixels
+        if pixels.ndim == 3:
+            return pixels
+        return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_YUV2RGB_I420), np.uint8)
 
     @property
     def grey(self) -> Image:
         """(H, W) uint8, the full range of grey levels."""
-        if self.pixels.ndim == 3:
-            return np.asarray(cv2.cvtColor(self.pixels, cv2.COLOR_RGB2GRAY), np.uint8)
-        return np.asarray(cv2.LUT(self.pixels[: len(self.pixels) * 2 // 3], _FULL_RANGE), np.uint8)
+        pixels = self.pixels
+        if pixels.ndim == 3:
+            return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), np.uint8)
+        return np.asarray(cv2.LUT(pixels[: len(pixels) * 2 // 3], _FULL_RANGE), np.uint8)
 
     def repeats(self, other: Picture) -> bool:
         """Whether the other picture is the same, but for what an encoder makes of a repetition.
