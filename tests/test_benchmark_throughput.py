@@ -33,6 +33,28 @@ def test_the_report_holds_what_is_promised(clips, tmp_path, capsys):
         assert word in out
 
 
+def test_growth_with_points_and_pixels_is_a_table(clips, tmp_path, capsys):
+    path = tmp_path / "t.json"
+    growth = ["--points", "20,60", "--height", "60,120", "--minutes", "0.01", "--no-video"]
+    assert main(["throughput", str(clips["plain"]), "--runs", "1", *growth, "--json", str(path)]) == 0
+    measured = json.loads(path.read_text())["measured"]
+    assert [(one["height"], one["points"]) for one in measured] == [(60, 20), (60, 60), (120, 20), (120, 60)]
+    assert [line.split()[:2] for line in capsys.readouterr().out.splitlines()[-4:]] == [
+        ["80x60", "20"],
+        ["80x60", "60"],
+        ["160x120", "20"],
+        ["160x120", "60"],
+    ]
+
+
+@pytest.mark.parametrize("growth", [["--points", "20,"], ["--height", "8,60"], ["--minutes", "-1"]])
+def test_growth_that_makes_no_sense(clips, growth, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["throughput", str(clips["plain"]), *growth])
+    assert ended.value.code == 2
+    assert growth[0] in capsys.readouterr().err
+
+
 def test_a_clip_that_cannot_be_read(tmp_path, capsys):
     assert main(["throughput", str(tmp_path / "none.mp4")]) == 3
     assert "none.mp4" in capsys.readouterr().err

@@ -62,6 +62,23 @@ def whole(least: int) -> Callable[[str], int]:
     return convert
 
 
+def wholes(least: int) -> Callable[[str], list[int]]:
+    """A converter to several whole numbers of at least ``least``, with commas between them."""
+    one = whole(least)
+    return lambda text: [one(part) for part in text.split(",")]
+
+
+def length(text: str) -> float:
+    """A converter to a number of 0 or more."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of 0 or more")
+    return value
+
+
 def seconds(text: str) -> float:
     """A converter of times as the command ``ifsvideo`` takes them."""
     try:

@@ -6,8 +6,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
@@ -18,7 +17,7 @@ from tqdm import tqdm
 
 from ifsvideo.benchmark import table, throughput_floor
 from ifsvideo.benchmark.memory import MemoryWatch
-from ifsvideo.benchmark.options import STATUS, add_config, configuration, whole, write_report
+from ifsvideo.benchmark.options import STATUS, add_config, configuration, length, whole, wholes, write_report
 from ifsvideo.benchmark.runner import Report
 from ifsvideo.benchmark.throughput_floor import Floor
 from ifsvideo.config import Config
@@ -202,33 +201,55 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("clip", metavar="CLIP", type=Path, help="a video of constant rate")
     add_config(made)
-    made.add_argument("--points", metavar="N", type=whole(1), help="points tracked at once, by both")
-    made.add_argument("--no-video", action="store_true", help="encode nothing")
-    made.add_argument("--height", metavar="N", type=whole(16), help="scale the clip to this height before")
-    made.add_argument(
-        "--minutes", metavar="N", type=whole(0), default=0, help="loop the clip to this length before"
-    )
-    made.add_argument("--runs", metavar="N", type=whole(1), default=3, help="runs of either (3)")
-    made.add_argument("--json", metavar="FILE", type=Path, help="write all figures there")
+    add = made.add_argument
+    add("--points", metavar="N,...", type=wholes(1), help="points tracked at once, by both")
+    add("--height", metavar="N,...", type=wholes(16), help="scale the clip to this height before")
+    add("--minutes", metavar="N", type=length, default=0.0, help="loop the clip to this length before")
+    add("--no-video", action="store_true", help="encode nothing")
+    add("--runs", metavar="N", type=whole(1), default=3, help="runs of either (3)")
+    add("--json", metavar="FILE", type=Path, help="write all figures there")
     return made
 
 
 def measure(options: argparse.Namespace) -> None:
-    """Measure a clip; prints the figures, and a table with a line for each stage."""
+    """Measure a clip; prints the figures, and a table with a line for each stage.
+
+    With several heights or numbers of points, each with each, a table of all follows.
+    """
     if options.json:
         check_writable(options.json)
     open_source(options.clip)  # what cannot be read is refused before the work, not after it
     config = configuration(options.config)
-    if options.points:
-        config = replace(config, tracking=replace(config.tracking, max_points=options.points))
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(TemporaryDirectory()))
-        clip = looped(options.clip, options.minutes, options.height, folder)
-        report = run_throughput(clip, config, options.runs, video=not options.no_video)
-    report["clip"] = options.clip.name
-    print(_in_words(report))
+    reports: list[Report] = []
+    for height in options.height or [None]:
+        with TemporaryDirectory() as folder:
+            clip = looped(options.clip, options.minutes, height, Path(folder))
+            for points in options.points or [config.tracking.max_points]:
+                own = replace(config, tracking=replace(config.tracking, max_points=points))
+                report = run_throughput(clip, own, options.runs, video=not options.no_video)
+                reports.append({**report, "clip": options.clip.name})
+                print(_in_words(reports[-1]))
+    if len(reports) > 1:
+        print("\n" + _side_by_side(reports))
     if options.json:
-        write_report(options.json, {"dataset": "throughput", "configuration": options.config, **report})
+        whole_report = reports[0] if len(reports) == 1 else {"measured": reports}
+        write_report(options.json, {"dataset": "throughput", "configuration": options.config, **whole_report})
+
+
+def _side_by_side(reports: Sequence[Report]) -> str:
+    """A line for each report."""
+    header = ("picture", "points", "ms a frame", "of the floor", "ratio", "peak MB")
+    rows = [
+        [
+            f"{report['width']}x{report['height']}",
+            report["points"],
+            *(1e3 / report[name] for name in ("fps", "floor_fps")),
+            report["ratio"],
+            report["peak_rss_mb"],
+        ]
+        for report in reports
+    ]
+    return table.align(header, rows)
 
 
 def _in_words(report: Report) -> str:
