@@ -11,7 +11,7 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from types import FrameType
-from typing import Any
+from typing import Any, TextIO
 
 from tqdm import tqdm
 
@@ -43,17 +43,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not debug:
         warnings.simplefilter("ignore")  # NumPy's and others': meant for developers, and --quiet is quiet
     try:
-        with _signals_raise(), _flushed():
-            return _run(parse(argv), debug)
+        with _signals_raise():
+            return _run(_parsed(argv), debug)
     except _Interrupted as interrupted:
-        print("ifsvideo: interrupted", file=sys.stderr)
+        with _while_read(sys.stderr):
+            print("ifsvideo: interrupted", file=sys.stderr)
         return interrupted.exit_status
-    except BrokenPipeError:
-        # Whoever read our summary has left; Python's own flush at exit must not complain of it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _DONE
     except Exception as error:
         return _report(error, debug)
+
+
+def _parsed(argv: Sequence[str]) -> Arguments:
+    """The arguments; the help, which ends the process, may have no reader."""
+    with _while_read(sys.stdout):
+        try:
+            return parse(argv)
+        finally:
+            sys.stdout.flush()
+    raise SystemExit(_DONE)
 
 
 def _run(told: Arguments, debug: bool) -> int:
@@ -98,7 +105,8 @@ def _outcomes(
         closing(each_done(iter(jobs), work, workers, told.workers)) as outcomes,
     ):
         for job, outcome in outcomes:
-            bar.update()
+            with _while_read(sys.stderr):
+                bar.update()
             with bar.external_write_mode(sys.stderr):
                 yield job, outcome
 
@@ -115,7 +123,8 @@ def _with_bar(job: Job, told: Arguments) -> Outcome:
 
 
 def _say(text: str) -> None:
-    print(text, flush=True)
+    with _while_read(sys.stdout):
+        print(text, flush=True)
 
 
 def _report(error: Exception, debug: bool) -> int:
@@ -133,7 +142,8 @@ def _report(error: Exception, debug: bool) -> int:
 
 
 def _complain(message: str) -> None:
-    print("ifsvideo: error:", " ".join(message.split()), file=sys.stderr)
+    with _while_read(sys.stderr):
+        print("ifsvideo: error:", " ".join(message.split()), file=sys.stderr)
 
 
 class _Bar:
@@ -147,26 +157,29 @@ class _Bar:
         """A `ifsvideo.types.Progress`."""
         if self._quiet:
             return
-        if self._bar is None:
-            self._bar = tqdm(unit="frame", file=sys.stderr, dynamic_ncols=True)
-        self._bar.total = total
-        self._bar.update(done - self._bar.n)
+        with _while_read(sys.stderr):
+            if self._bar is None:
+                self._bar = tqdm(unit="frame", file=sys.stderr, dynamic_ncols=True)
+            self._bar.total = total
+            self._bar.update(done - self._bar.n)
 
     def __enter__(self) -> _Bar:
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:
-            self._bar.close()
+            with _while_read(sys.stderr):
+                self._bar.close()
 
 
 @contextmanager
-def _flushed() -> Iterator[None]:
-    """Let a broken pipe show here and not at Python's exit, where it cannot be caught."""
+def _while_read(stream: TextIO) -> Iterator[None]:
+    """Whoever reads what we print may leave: that is no fault, and the work goes on unseen."""
     try:
         yield
-    finally:
-        sys.stdout.flush()
+    except BrokenPipeError:
+        # What is printed from now on, at the latest by Python's own flush at exit, must not complain of it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -23,7 +24,7 @@ from ifsvideo.tracking.cuts import alike
 from ifsvideo.tracking.steps import follow
 from ifsvideo.tracking.tracker import KltTracker
 from ifsvideo.types import FramePoints
-from ifsvideo.video import open_source
+from ifsvideo.video import open_source, picture
 from ifsvideo.video.picture import Picture
 from ifsvideo.worker import Caller, Worker
 
@@ -284,33 +285,104 @@ def children(process: subprocess.Popen[str], word: str) -> list[int]:
     """Ids of the children whose command holds a word."""
     listed = Path(f"/proc/{process.pid}/task").glob("*/children")
     ids = [int(child) for task in listed for child in task.read_text().split()]
-    return [pid for pid in ids if word in Path(f"/proc/{pid}/cmdline").read_text()]
+    lines = {pid: Path(f"/proc/{pid}/cmdline").read_text().replace("\0", " ") for pid in ids}
+    return [pid for pid, line in lines.items() if word in line]
 
 
 @pytest.fixture
-def long_run(tmp_path):
-    """The command at work on a clip that is too long to end by itself here."""
-    clip = encode(tmp_path / "clip.mp4", drive(40) * 50)
-    line = [sys.executable, "-m", "ifsvideo", str(clip), "--max-points", "80"]
+def long_clip(tmp_path) -> Path:
+    """A clip that is too long to be done with here."""
+    return encode(tmp_path / "clip.mp4", drive(40) * 50)
+
+
+@pytest.fixture
+def long_run(long_clip):
+    """The command at work on it."""
+    line = [sys.executable, "-m", "ifsvideo", str(long_clip), "--max-points", "80"]
     with subprocess.Popen(
-        line, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        line, cwd=long_clip.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as run:
         yield run
         run.kill()
 
 
-def test_a_killed_worker_ends_the_run(long_run, tmp_path) -> None:
-    def labels_are_written() -> bool:
-        return any(path.stat().st_size > 100 for path in tmp_path.glob(".ifsvideo-*.csv"))
+def labels_are_written(folder: Path) -> bool:
+    """Whether a run that writes there is past its first windows."""
+    return any(path.stat().st_size > 100 for path in folder.glob(".ifsvideo-*.csv"))
 
-    (worker,) = wait_for(lambda: children(long_run, "ifsvideo.worker"), long_run)
-    wait_for(labels_are_written, long_run)
-    os.kill(worker, signal.SIGKILL)
+
+@pytest.mark.parametrize(
+    ("word", "status", "complaint"),
+    [
+        ("ifsvideo.worker", 1, "the process that segments was killed (signal 9)"),
+        ("libx264", 4, "clip.ifs.mp4: ffmpeg could not write the video (it was killed)"),
+        ("out_color_matrix", 1, "clip.mp4: ffmpeg was killed while reading (signal 9)"),
+    ],
+    ids=["segmenter", "encoder", "decoder"],
+)
+def test_a_killed_process_ends_the_run(long_run, tmp_path, word, status, complaint) -> None:
+    wait_for(lambda: labels_are_written(tmp_path), long_run)
+    (child,) = wait_for(lambda: children(long_run, word), long_run)
+    os.kill(child, signal.SIGKILL)
     _, err = long_run.communicate(timeout=20)
-    assert long_run.returncode == 1
-    assert err.splitlines()[-1].startswith("ifsvideo: error: the process that segments was killed (signal 9)")
+    assert long_run.returncode == status
+    last = err.splitlines()[-1]
+    assert last.startswith("ifsvideo: error: ")
+    assert complaint in last
     assert [path.name for path in tmp_path.iterdir()] == ["clip.mp4"]
     assert children_naming(str(tmp_path)) == []
+
+
+def test_a_disk_that_fills_up_ends_the_run(long_clip) -> None:
+    """What the encoder writes reaches the limit after its first seconds of video."""
+    line = [sys.executable, "-m", "ifsvideo", str(long_clip), "--max-points", "80"]
+    done = subprocess.run(
+        line,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000)),
+    )
+    assert done.returncode == 4
+    assert "clip.ifs." in done.stderr.splitlines()[-1]
+    assert [path.name for path in long_clip.parent.iterdir()] == ["clip.mp4"]
+    assert children_naming(str(long_clip.parent)) == []
+
+
+def test_a_pipe_whose_writer_dies_gives_what_came(tmp_path) -> None:
+    clip = encode(tmp_path / "clip.ts", drive(60))
+    line = [sys.executable, "-m", "ifsvideo", "-", "-o", "o.mp4", "--max-points", "80"]
+    with subprocess.Popen(line, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as run:
+        assert run.stdin is not None
+        data = clip.read_bytes()
+        run.stdin.write(data[: len(data) // 2])
+        run.stdin.close()
+        assert run.wait(timeout=60) == 0
+    assert 15 < decoded(tmp_path / "o.mp4")[0] < 50
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.ts", "o.csv", "o.mp4"]
+
+
+def test_a_screen_that_goes_away_does_not_end_the_run(clip, tmp_path) -> None:
+    """Who looked at the progress has left: `ifsvideo clip.mp4 2>&1 | head`."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    line = [sys.executable, "-m", "ifsvideo", str(clip), "--max-points", "80"]
+    done = subprocess.run(line, stdout=writer, stderr=writer, check=False, timeout=60)
+    os.close(writer)
+    assert done.returncode == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.ifs.csv", "clip.ifs.mp4", "clip.mp4"]
+
+
+def test_a_large_picture_waits_as_jpeg(monkeypatch) -> None:
+    image = drive(1)[0]
+    assert Picture(image).to_wait().pixels is image
+    monkeypatch.setattr(picture, "LARGEST_KEPT", 1000)
+    (step,) = steps([image])
+    assert step.picture is not None
+    assert step.picture.pixels is not step.picture.pixels, "it is decoded when it is asked for"
+    difference = np.abs(step.picture.rgb.astype(int) - image)
+    assert 0 < difference.mean() < 3
 
 
 def test_a_run_that_is_killed_leaves_no_process(long_run, tmp_path) -> None:
