@@ -98,7 +98,7 @@ def test_options_exist(capsys):
 
 def test_benchmark_commands_are_understood(capsys):
     lines = [shlex.split(line) for line in commands() if "ifsvideo.benchmark" in line]
-    own = {"samples", "objects", "static", "throughput"}
+    own = {"samples", "objects", "static", "throughput", "page"}
     assert {line[3] for line in lines} == own | {"hopkins155", "kt3dmoseg"}
     for line in lines:
         assert line[:3] == [".venv/bin/python", "-m", "ifsvideo.benchmark"]

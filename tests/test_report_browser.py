@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from . import browser as driven
-from .browser import Browser
+from ifsvideo.benchmark import browser as driven
+from ifsvideo.benchmark.browser import Browser
+
 from .conftest import tone
 from .reports import Mover, make_report
 
-pytestmark = pytest.mark.skipif(
-    not (driven.CHROMIUM and driven.DRIVER), reason="no chromium and chromedriver here"
-)
+pytestmark = pytest.mark.skipif(not driven.HERE, reason="no chromium and chromedriver here")
 
 TWO = [Mover((60, 60), (2, 0), first=4, last=30), Mover((200, 160), (0, -0.5), first=10, last=50, growth=0.4)]
 NUMBERS = "return [...document.querySelectorAll('#objects tbody tr')].map(row => Number(row.dataset.number))"

@@ -6,11 +6,12 @@ tracks      DIR or its subfolders hold tracks of your own, NAME.npz: xy (F, P, 2
             optional visible (F, P), labels (P,) integers: groups from 1, 0 not known; or .mat as above
 samples     DIR holds NAME.mp4 and NAME_truth.npz (masks (F, H, W) uint8: 0 background, k object k)
 
-and, with options of their own (throughput --help, objects --help, cost --help, static --help, marked --help),
+and, with options of their own (throughput --help, objects --help, and so on),
 
 throughput CLIP  how fast the whole program is beside decoding, tracking and encoding, and its memory
 objects DIR      the sample clips: boxes, times to contact and events of the objects
 cost CLIP        what the further outputs cost, beside the overlay alone
+page             how large a page of many objects is, and how soon Chromium shows it
 static CLIP ...  clips in which nothing moves: how much is called moving, or not decided
 marked CLIP ...  real clips in which what moves was marked by hand: how much of it is found, and what besides
 
@@ -65,6 +66,7 @@ from ifsvideo.benchmark import (
     learning_data,
     marked,
     objects,
+    page,
     samples,
     static,
     table,
@@ -118,6 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run, options = objects.measure, objects.parser().parse_args(line[1:])
     elif line[:1] == ["cost"]:
         run, options = cost.measure, cost.parser().parse_args(line[1:])
+    elif line[:1] == ["page"]:
+        run, options = page.measure, page.parser().parse_args(line[1:])
     elif line[:1] == ["static"]:
         run, options = static.measure, static.parser().parse_args(line[1:])
     elif line[:1] == ["marked"]:

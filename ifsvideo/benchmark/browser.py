@@ -11,11 +11,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.error import URLError
+from urllib.error import HTTPError, URLError
 from urllib.request import Request, urlopen
+
+from ifsvideo.errors import IfsVideoError
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
+HERE = bool(CHROMIUM and DRIVER)
+"""Whether there is a browser to drive."""
 _FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync --disable-dev-shm-usage --window-size=1280,1000 "
@@ -54,7 +58,8 @@ class Browser:
         """Run a script till its value is true; that value."""
         deadline = time.monotonic() + seconds
         while not (value := self.run(script)):
-            assert time.monotonic() < deadline, f"never true: {script}"
+            if time.monotonic() > deadline:
+                raise IfsVideoError(f"the browser waited {seconds:g} s in vain for: {script}")
             time.sleep(0.02)
         return value
 
@@ -100,8 +105,8 @@ class Browser:
             with urlopen(request, timeout=60) as answer:
                 return json.load(answer)["value"]
         except URLError as error:
-            detail = error.read().decode() if hasattr(error, "read") else ""  # type: ignore[union-attr]
-            raise AssertionError(f"{method} {path}: {error} {detail}") from None
+            detail = error.read().decode() if isinstance(error, HTTPError) else ""
+            raise IfsVideoError(f"the browser failed at {method} {path}: {error} {detail}") from None
 
 
 def _device(kind: str, actions: list[dict[str, Any]]) -> dict[str, Any]:
@@ -132,4 +137,4 @@ def _port(log: Path) -> int:
             if "started successfully on port" in line:
                 return int(line.rstrip(".").rsplit(" ", 1)[1])
         time.sleep(0.05)
-    raise AssertionError(f"chromedriver did not start: {log.read_text()}")
+    raise IfsVideoError(f"chromedriver did not start: {log.read_text()}")
