@@ -82,6 +82,7 @@ from ifsvideo.benchmark.options import (
     add_runs,
     configuration,
     made_folder,
+    tell,
     whole,
     write_report,
     write_text,
@@ -267,13 +268,12 @@ def _measure(options: argparse.Namespace) -> None:
 
 
 def _measure_samples(options: argparse.Namespace) -> None:
-    chosen = samples.clips(options.folder, options.only)
-    factory = samples.PipelineFactory(configuration(options.config))
-    scores = samples.run_samples(chosen, factory, options.runs, options.seed, options.jobs)
-    report = {"dataset": options.dataset, "configuration": options.config, **scores}
-    print(table.samples(report))
-    if options.json:
-        write_report(options.json, report)
+    def scores() -> Report:
+        chosen = samples.clips(options.folder, options.only)
+        factory = samples.PipelineFactory(configuration(options.config))
+        return samples.run_samples(chosen, factory, options.runs, options.seed, options.jobs)
+
+    tell("samples", options, scores, table.samples)
 
 
 def _measure_points(options: argparse.Namespace) -> None:

@@ -13,9 +13,8 @@ from tempfile import TemporaryDirectory
 from tqdm import tqdm
 
 from ifsvideo.benchmark import table
-from ifsvideo.benchmark.options import STATUS, add_config, configuration, whole, write_report
+from ifsvideo.benchmark.options import STATUS, add_config, configuration, tell, whole
 from ifsvideo.benchmark.runner import Report
-from ifsvideo.output.atomic import check_writable
 from ifsvideo.output.products import ENDINGS, Products
 from ifsvideo.pipeline import Pipeline
 from ifsvideo.video import open_source
@@ -73,13 +72,16 @@ def parser() -> argparse.ArgumentParser:
 
 def measure(options: argparse.Namespace) -> None:
     """Measure a video; prints a table with a line for each way."""
-    if options.json:
-        check_writable(options.json)
-    open_source(options.clip)  # what cannot be read is refused before the work, not after it
-    report = run_cost(options.clip, Pipeline(configuration(options.config)), options.runs)
+
+    def scores() -> Report:
+        open_source(options.clip)  # what cannot be read is refused before the work, not after it
+        return run_cost(options.clip, Pipeline(configuration(options.config)), options.runs)
+
+    tell("cost", options, scores, as_table)
+
+
+def as_table(report: Report) -> str:
+    """A line for each way, and the ratio."""
     rows = [[way, median(seconds)] for way, seconds in report["seconds"].items()]
-    print(f"cost: {report['clip']}, median of {report['runs']}\n")
-    print(table.align(("written", "seconds"), rows))
-    print(f"\nratio: {report['ratio']:.2f}")
-    if options.json:
-        write_report(options.json, {"dataset": "cost", "configuration": options.config, **report})
+    title = f"cost: {report['clip']}, median of {report['runs']}"
+    return f"{title}\n\n{table.align(('written', 'seconds'), rows)}\n\nratio: {report['ratio']:.2f}"

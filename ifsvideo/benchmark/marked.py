@@ -11,10 +11,9 @@ import numpy as np
 
 from ifsvideo.benchmark import metrics, table
 from ifsvideo.benchmark.marking import MOVES, STANDS, Marks, marks_of
-from ifsvideo.benchmark.options import STATUS, add_config, add_runs, configuration, write_report
+from ifsvideo.benchmark.options import STATUS, add_config, add_runs, configuration, tell
 from ifsvideo.benchmark.runner import Report, in_processes
 from ifsvideo.benchmark.samples import PipelineFactory, Runnable
-from ifsvideo.output.atomic import check_writable
 from ifsvideo.types import BACKGROUND, LabelTable
 from ifsvideo.video import open_source
 
@@ -143,14 +142,12 @@ def parser() -> argparse.ArgumentParser:
 
 def measure(options: argparse.Namespace) -> None:
     """Measure clips; prints a table with a line for each."""
-    if options.json:
-        check_writable(options.json)
-    factory = PipelineFactory(configuration(options.config))
-    scores = run_marked(options.clips, factory, options.runs, options.seed, options.jobs)
-    report = {"dataset": "marked", "configuration": options.config, **scores}
-    print(as_table(report))
-    if options.json:
-        write_report(options.json, report)
+
+    def scores() -> Report:
+        factory = PipelineFactory(configuration(options.config))
+        return run_marked(options.clips, factory, options.runs, options.seed, options.jobs)
+
+    tell("marked", options, scores, as_table)
 
 
 def as_table(report: Report) -> str:

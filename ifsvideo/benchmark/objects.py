@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ifsvideo.benchmark import samples, table
 from ifsvideo.benchmark.object_truth import ObjectTruth, load_truth
-from ifsvideo.benchmark.options import STATUS, add_config, add_only, add_runs, configuration, write_report
+from ifsvideo.benchmark.options import STATUS, add_config, add_only, add_runs, configuration, tell
 from ifsvideo.benchmark.runner import Report, in_processes
 from ifsvideo.objects.history import Event, ObjectHistory, ObjectTable
-from ifsvideo.output.atomic import check_writable
 from ifsvideo.output.scenes import Scenes
 from ifsvideo.types import Floats, FramePoints, Result
 
@@ -212,15 +211,13 @@ def parser() -> argparse.ArgumentParser:
 
 def measure(options: argparse.Namespace) -> None:
     """Measure clips; prints a table of objects and one of events."""
-    if options.json:
-        check_writable(options.json)
-    chosen = samples.clips(options.folder, options.only)
-    factory = samples.PipelineFactory(configuration(options.config))
-    scores = run_objects(chosen, factory, options.runs, options.seed, options.jobs)
-    report = {"dataset": "objects", "configuration": options.config, **scores}
-    print(as_table(report))
-    if options.json:
-        write_report(options.json, report)
+
+    def scores() -> Report:
+        chosen = samples.clips(options.folder, options.only)
+        factory = samples.PipelineFactory(configuration(options.config))
+        return run_objects(chosen, factory, options.runs, options.seed, options.jobs)
+
+    tell("objects", options, scores, as_table)
 
 
 def as_table(report: Report) -> str:

@@ -12,7 +12,7 @@ from ifsvideo.benchmark.runner import Report
 from ifsvideo.config import Config
 from ifsvideo.config_file import load_config
 from ifsvideo.errors import OutputError, UsageError
-from ifsvideo.output.atomic import output_error, replacing
+from ifsvideo.output.atomic import check_writable, output_error, replacing
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.video import parse_time
 
@@ -100,6 +100,33 @@ def made_folder(path: Path) -> Path:
     except OSError as fault:
         raise OutputError(f"{path}: cannot be made ({fault.strerror}); name another folder") from fault
     return path
+
+
+def tell(
+    dataset: str, options: argparse.Namespace, scores: Callable[[], Report], as_table: Callable[[Report], str]
+) -> None:
+    """Measure, print a table, write the figures where ``--json`` says; whether they can be is asked first.
+
+    Parameters
+    ----------
+    dataset : str
+        What the report is of.
+    options : argparse.Namespace
+        With ``json`` and, where there is one, ``config``.
+    scores : callable
+        Measures.
+    as_table : callable
+        The report for people.
+    """
+    if options.json:
+        check_writable(options.json)
+    report: Report = {"dataset": dataset}
+    if "config" in options:
+        report["configuration"] = options.config
+    report |= scores()
+    print(as_table(report))
+    if options.json:
+        write_report(options.json, report)
 
 
 def write_report(path: Path, report: Report) -> None:

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ifsvideo.benchmark import browser
-from ifsvideo.benchmark.options import STATUS, whole, write_report
+from ifsvideo.benchmark.options import STATUS, tell, whole
 from ifsvideo.benchmark.runner import Report
 from ifsvideo.objects.history import ObjectHistory
-from ifsvideo.output.atomic import Outputs, check_writable
+from ifsvideo.output.atomic import Outputs
 from ifsvideo.output.scenes import Scenes
 from ifsvideo.report import ReportSink
 from ifsvideo.types import FramePoints, Image, Scene, VideoInfo
@@ -123,14 +123,13 @@ def parser() -> argparse.ArgumentParser:
 
 def measure(options: argparse.Namespace) -> None:
     """Measure a page; prints its size and how soon it is there."""
-    if options.json:
-        check_writable(options.json)
-    report = run_page(options.objects, options.minutes, options.runs)
-    print(f"page: {options.minutes} minutes, {options.objects} objects\n")
-    print(f"size: {report['bytes'] / 1e6:.2f} MB")
+    tell("page", options, lambda: run_page(options.objects, options.minutes, options.runs), as_table)
+
+
+def as_table(report: Report) -> str:
+    """Size, and how soon it is there."""
+    opened = "not measured, there is no chromium with chromedriver here"
     if report["seconds"]:
-        print(f"open after: {median(report['seconds']):.2f} s, median of {options.runs}")
-    else:
-        print("open after: not measured, there is no chromium with chromedriver here")
-    if options.json:
-        write_report(options.json, {"dataset": "page", **report})
+        opened = f"{median(report['seconds']):.2f} s, median of {report['runs']}"
+    title = f"page: {report['minutes']} minutes, {report['objects']} objects"
+    return f"{title}\n\nsize: {report['bytes'] / 1e6:.2f} MB\nopen after: {opened}"

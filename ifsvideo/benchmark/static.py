@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ifsvideo.benchmark import metrics, table
-from ifsvideo.benchmark.options import STATUS, add_config, add_runs, configuration, seconds, write_report
+from ifsvideo.benchmark.options import STATUS, add_config, add_runs, configuration, seconds, tell
 from ifsvideo.benchmark.runner import Report, in_processes
 from ifsvideo.benchmark.samples import PipelineFactory, Runnable
-from ifsvideo.output.atomic import check_writable
 from ifsvideo.types import BACKGROUND, Result
 from ifsvideo.video import open_source
 
@@ -124,17 +123,15 @@ def parser() -> argparse.ArgumentParser:
 
 def measure(options: argparse.Namespace) -> None:
     """Measure clips; prints a table with a line for each."""
-    if options.json:
-        check_writable(options.json)
-    for clip in options.clips:  # what cannot be read is refused before the work, not after it
-        open_source(clip, start=options.start, end=options.end)
-    factory = PipelineFactory(configuration(options.config))
-    stretch = options.start, options.end
-    scores = run_static(options.clips, factory, *stretch, options.runs, options.seed, options.jobs)
-    report = {"dataset": "static", "configuration": options.config, **scores}
-    print(as_table(report))
-    if options.json:
-        write_report(options.json, report)
+
+    def scores() -> Report:
+        for clip in options.clips:  # what cannot be read is refused before the work, not after it
+            open_source(clip, start=options.start, end=options.end)
+        factory = PipelineFactory(configuration(options.config))
+        stretch = options.start, options.end
+        return run_static(options.clips, factory, *stretch, options.runs, options.seed, options.jobs)
+
+    tell("static", options, scores, as_table)
 
 
 def as_table(report: Report) -> str:
