@@ -149,7 +149,7 @@ class Pipeline:
         watch = Stopwatch()
         census, table = Census(), TableSink()
         with Outputs() as outputs:
-            sound = clip.path if audio and clip.info.has_audio else None
+            sound = clip.frames.sound if audio and clip.frames else None
             further = ProductsSink(products, clip.info, clip.path, outputs, sound)
             sinks: list[Sink] = [census]
             sinks += [table] if keep_table else []

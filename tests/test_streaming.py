@@ -158,6 +158,49 @@ def test_join_on_the_command_line(command, clips, tmp_path) -> None:
     assert decoded(tmp_path / "o.mp4")[0] == 48
 
 
+def beeping(path: Path, at: float | None) -> Path:
+    """A clip of a second and a bit; a beep sounds from ``at`` on for 0.2 s, or there is no sound."""
+    silent = encode(path.with_suffix(".mkv"), drive(26))
+    if at is None:
+        return silent
+    tone = ("-f", "lavfi", "-i", f"aevalsrc=sin(2764*t)*between(t\\,{at}\\,{at + 0.2}):d=1.2:s=44100")
+    line = [FFMPEG, "-v", "error", "-i", str(silent), *tone, "-c:v", "copy", "-c:a", "aac", str(path)]
+    subprocess.run(line, check=True)
+    silent.unlink()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("start", "beeps"),
+    [(0.0, [0.5, 2.9, 4.1]), (1.6, [1.3, 2.5])],
+    ids=["whole", "from the second chapter on"],
+)
+def test_joined_chapters_keep_their_sound_in_step(tmp_path, start, beeps) -> None:
+    """1.3 s of pictures each: one with a beep, one without sound, two with a beep each."""
+    places = (0.5, None, 0.3, 0.2)
+    parts = [beeping(tmp_path / f"{k}.mp4", at) for k, at in enumerate(places)]
+    run = Pipeline(Config(tracking=FEW), segmenter=ByStep()).run(parts, tmp_path / "o.mp4", start=start)
+    assert run.warnings == ()
+    line = [
+        FFMPEG,
+        "-v",
+        "error",
+        "-i",
+        str(tmp_path / "o.mp4"),
+        "-f",
+        "f32le",
+        "-ac",
+        "1",
+        "-ar",
+        "8000",
+        "-",
+    ]
+    heard = np.frombuffer(subprocess.run(line, check=True, capture_output=True).stdout, np.float32)
+    loud = np.flatnonzero(np.abs(heard) > 0.1) / 8000
+    begins = loud[np.flatnonzero(np.diff(loud, prepend=-1) > 0.1)]
+    np.testing.assert_allclose(begins, beeps, atol=0.03)
+
+
 @pytest.mark.parametrize("options", [(), ("-f", "mpegts"), ("-f", "matroska")])
 def test_standard_input(clips, tmp_path, options) -> None:
     piped = tmp_path / "piped"

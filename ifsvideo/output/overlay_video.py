@@ -10,6 +10,7 @@ from ifsvideo.output.atomic import Outputs
 from ifsvideo.output.layout import Composition
 from ifsvideo.types import Image, Renderer, Scene, VideoInfo
 from ifsvideo.video import ANIMATIONS, AnimationWriter, VideoWriter
+from ifsvideo.video.sound import SoundSource
 
 _WITH_ALPHA = (".mov", *ANIMATIONS)
 
@@ -43,8 +44,8 @@ class OverlaySink:
     renderer : Renderer
     outputs : Outputs
         Group with which the file is placed.
-    audio_from : Path, optional
-        File whose sound is kept, where the file can hold it and plays at the same speed.
+    audio_from : path or JoinedSound, optional
+        Whose sound is kept, where the file can hold it and plays at the same speed.
     config : OverlayConfig, optional
 
     Raises
@@ -61,7 +62,7 @@ class OverlaySink:
         info: VideoInfo,
         renderer: Renderer,
         outputs: Outputs,
-        audio_from: Path | None = None,
+        audio_from: SoundSource | None = None,
         config: OverlayConfig | None = None,
     ) -> None:
         config = config or OverlayConfig()

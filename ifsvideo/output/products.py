@@ -19,6 +19,7 @@ from ifsvideo.output.summary_json import summary_document, write_summary
 from ifsvideo.output.tracks_npz import TracksSink
 from ifsvideo.report import ReportSink, video_beside
 from ifsvideo.types import Image, Result, Scene, Sink, VideoInfo
+from ifsvideo.video.sound import SoundSource
 
 ENDINGS = {"objects": ".csv", "mot": ".txt", "summary": ".json", "tracks": ".npz", "report": ".html"}
 """How the files end."""
@@ -120,8 +121,8 @@ class ProductsSink:
         The input, where it was read from disk; clips are cut out of it.
     outputs : Outputs
         Group with which all of it is placed.
-    sound : Path, optional
-        File whose sound the page's video has.
+    sound : path or JoinedSound, optional
+        Whose sound the page's video has.
 
     Attributes
     ----------
@@ -136,7 +137,7 @@ class ProductsSink:
         info: VideoInfo,
         source: Path | None,
         outputs: Outputs,
-        sound: Path | None = None,
+        sound: SoundSource | None = None,
     ) -> None:
         self.history = ObjectHistory(info, thumbnails=products.report is not None)
         self._products = products

@@ -19,6 +19,7 @@ from ifsvideo.report.pairs import Pairs
 from ifsvideo.report.shapes import DIRECTIONS, outline
 from ifsvideo.types import BACKGROUND, Image, Scene, VideoInfo
 from ifsvideo.video import VideoWriter
+from ifsvideo.video.sound import SoundSource
 
 EMBEDDED = 8_000_000
 """Largest video that is put into the page itself, bytes; a larger one stands beside it."""
@@ -50,8 +51,8 @@ class ReportSink:
         With thumbnails; it is fed and finished before this sink.
     outputs : Outputs
         Group with which the page is placed.
-    sound : Path, optional
-        File whose sound the page's video has.
+    sound : path or JoinedSound, optional
+        Whose sound the page's video has.
 
     Attributes
     ----------
@@ -75,7 +76,7 @@ class ReportSink:
         info: VideoInfo,
         history: ObjectHistory,
         outputs: Outputs,
-        sound: Path | None = None,
+        sound: SoundSource | None = None,
     ) -> None:
         self._path, self._name, self._info, self._history = path, name, info, history
         self._outputs, self._sound = outputs, sound
@@ -131,7 +132,7 @@ class ReportSink:
 class _PageVideo:
     """The plain pictures, small, as H.264, to be put into the page or beside it."""
 
-    def __init__(self, page: Path, info: VideoInfo, outputs: Outputs, sound: Path | None) -> None:
+    def __init__(self, page: Path, info: VideoInfo, outputs: Outputs, sound: SoundSource | None) -> None:
         self._place = video_beside(page)
         self._outputs = outputs
         self._scratch = outputs.add_scratch(self._place)

@@ -10,11 +10,12 @@ from pathlib import Path
 from ifsvideo.errors import InputError, UsageError
 from ifsvideo.types import Image
 from ifsvideo.video.picture import Picture
+from ifsvideo.video.sound import JoinedSound, SoundSource, Stretch
 from ifsvideo.video.source import FrameSource
 
 
 class Joined(FrameSource):
-    """Chapters of one recording, in order; their frames follow each other without a gap. It has no sound.
+    """Chapters of one recording, in order, each with its sound; their frames follow each other without a gap.
 
     Parameters
     ----------
@@ -41,7 +42,24 @@ class Joined(FrameSource):
         self._reading = first
         lengths = [chapter.info.frames for chapter in chapters]
         frames = None if None in lengths else sum(length or 0 for length in lengths)
-        self.info = replace(first.info, frames=frames, has_audio=False)
+        sounds = frames is not None and any(chapter.info.has_audio for chapter in chapters)
+        self.info = replace(first.info, frames=frames, has_audio=sounds)
+
+    @property
+    def sound(self) -> SoundSource | None:
+        """See `FrameSource.sound`."""
+        if not self.info.has_audio:
+            return None
+        return JoinedSound(
+            tuple(
+                Stretch(
+                    chapter.path if chapter.info.has_audio else None,
+                    chapter.info.start,
+                    float((chapter.info.frames or 0) / chapter.info.fps),
+                )
+                for chapter in self._chapters
+            )
+        )
 
     def frames(self) -> Generator[Image, None, None]:
         """See `FrameSource.frames`."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from ifsvideo.errors import UsageError
 from ifsvideo.types import Image, VideoInfo
 from ifsvideo.video.picture import Picture
+from ifsvideo.video.sound import SoundSource
 
 
 class FrameSource(ABC):
@@ -52,6 +53,11 @@ class FrameSource(ABC):
         with closing(self.frames()) as frames:
             for image in frames:
                 yield Picture(image)
+
+    @property
+    def sound(self) -> SoundSource | None:
+        """What is heard with the pictures."""
+        return self.path if self.info.has_audio else None
 
     def stop(self) -> None:
         """Make a pass that waits for data in another thread end soon, by whatever error; by default it is

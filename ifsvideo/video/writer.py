@@ -16,6 +16,7 @@ from ifsvideo.video import animation, ffmpeg
 from ifsvideo.video.feeding import FedWriter
 from ifsvideo.video.picture import planes_of
 from ifsvideo.video.probe import audio_codec, count_frames
+from ifsvideo.video.sound import JoinedSound, SoundSource
 
 FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 """Output endings and ffmpeg's name of the container."""
@@ -73,8 +74,8 @@ class VideoWriter(FedWriter):
         .mp4, .mov or .mkv.
     info : VideoInfo
         Size, rate and pixel aspect of the frames; ``info.start`` is where in ``audio_from`` the sound begins.
-    audio_from : Path, optional
-        File whose first sound stream is kept, for as long as the video is: copied where it is taken from its
+    audio_from : path or JoinedSound, optional
+        Whose first sound stream is kept, for as long as the video is: copied where it is taken from a file's
         beginning and the container holds its codec, else encoded as AAC, cut to the sample.
     outputs : Outputs, optional
         Group with which the file is placed; alone by default.
@@ -109,7 +110,7 @@ class VideoWriter(FedWriter):
         path: Path,
         info: VideoInfo,
         *,
-        audio_from: Path | None = None,
+        audio_from: SoundSource | None = None,
         outputs: Outputs | None = None,
         transparent: bool = False,
         for_page: bool = False,
@@ -161,29 +162,37 @@ class VideoWriter(FedWriter):
         faststart = [] if container == "matroska" else ["-movflags", "+faststart"]
         return [*faststart, "-f", container, "-y", ffmpeg.file_url(file)]
 
-    def _add_sound(self, source: Path) -> None:
+    def _add_sound(self, source: SoundSource) -> None:
         """Join pictures and sound; without sound, and with a warning, where the sound cannot be read."""
-        codec = audio_codec(source)
-        whole = self._info.start < 0.5 / self._info.fps
-        attempts = [["-c:a", "aac", "-b:a", "160k"]]
-        if whole and codec in _COPIED_SOUND[self.path.suffix.lower()]:
-            attempts.insert(0, ["-c:a", "copy"])
         complaints: list[str] = []
-        for attempt in attempts if codec else []:
-            complaints = self._join(source, attempt)
+        for inputs, codec in self._attempts(source):
+            complaints = self._join(inputs, codec)
             if not complaints:
                 return
         self._warn("the sound could not be kept" + (f" (ffmpeg: {complaints[-1]})" if complaints else ""))
         os.replace(self._pictures, self._target)
 
-    def _join(self, source: Path, codec: list[str]) -> list[str]:
+    def _attempts(self, source: SoundSource) -> list[tuple[list[str], list[str]]]:
+        """What ffmpeg reads, and what it makes of its sound; the way that loses least first."""
+        encoded = ["-c:a", "aac", "-b:a", "160k"]
+        if isinstance(source, JoinedSound):
+            return [(source.arguments(1), ["-map", "[sound]", *encoded])]
+        codec = audio_codec(source)
+        if codec is None:
+            return []
+        whole = self._info.start < 0.5 / self._info.fps
+        copied = whole and codec in _COPIED_SOUND[self.path.suffix.lower()]
+        inputs = ["-ss", f"{self._info.start:.6f}", "-vn", "-i", ffmpeg.file_url(source)]
+        codecs = [["-c:a", "copy"], encoded] if copied else [encoded]
+        return [(inputs, ["-map", "1:a:0", *own]) for own in codecs]
+
+    def _join(self, inputs: list[str], sound: list[str]) -> list[str]:
         """Write pictures and sound to the target; returns what ffmpeg complained of, if it failed."""
         length = math.ceil(1e6 * self.frames / self._info.fps)
         status, _, complaints = ffmpeg.run(
             [
-                *("-loglevel", "error", "-i", ffmpeg.file_url(self._pictures)),
-                *("-ss", f"{self._info.start:.6f}", "-vn", "-i", ffmpeg.file_url(source)),
-                *("-map", "0:v", "-map", "1:a:0", "-c:v", "copy", *codec, "-t", f"{length}us"),
+                *("-loglevel", "error", "-i", ffmpeg.file_url(self._pictures), *inputs),
+                *("-map", "0:v", *sound, "-c:v", "copy", "-t", f"{length}us"),
                 *self._destination(self._target),
             ]
         )
