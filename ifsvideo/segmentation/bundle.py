@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 _NEAREST = 0.05
 """Least depth q_z relative to that in the reference frame; keeps a diverging step finite."""
+_IDLE = 1e-3
+"""Share of the cost by which a step must change it: after two in a row that do not, it is done."""
 _GLOBALS = 2
 """Shared unknowns: logarithm of the focal length, radial distortion."""
 
@@ -40,6 +42,12 @@ def rotation(omega: Array) -> Array:
     return np.asarray(
         np.eye(3) + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * (cross @ cross)
     )
+
+
+def by_points(J: Array) -> Array:
+    """Measurements (K, P, 2, N) of K cameras as those of P points, (P, 2K, N): then a sum over all that is
+    seen of a point is one product of matrices."""
+    return J.transpose(1, 0, 2, 3).reshape(J.shape[1], -1, J.shape[3])
 
 
 @dataclass(frozen=True)
@@ -130,7 +138,10 @@ class Bundle:
 
     def residual(self, e: Estimate) -> Array:
         """Projection minus observation (K, P, 2), zero where unseen."""
-        return np.where(self.seen[..., None], self.project(e).u - self.observed, 0.0)
+        return self._missed(self.project(e))
+
+    def _missed(self, p: Projection) -> Array:
+        return np.where(self.seen[..., None], p.u - self.observed, 0.0)
 
     def rms(self, residual: Array) -> Array:
         """Root of the mean square residual of each point (P,), normalised units, its own unknowns taken
@@ -148,15 +159,20 @@ class Bundle:
 
         ``translate=False`` keeps the cameras in place: they only turn.
         """
-        damping = 1e-3
-        for width in widths:
-            residual = self.residual(e)
-            step = self._step(e, residual, width, damping, translate)
-            before, after = self.cost(residual, width), self.cost(self.residual(step), width)
+        damping, idle = 1e-3, 0
+        seen = self.project(e)
+        for place, width in enumerate(widths):
+            residual = self._missed(seen)
+            step = self._step(e, seen, residual, width, damping, translate)
+            seen_then = self.project(step)
+            before, after = self.cost(residual, width), self.cost(self._missed(seen_then), width)
             if after <= before * (1 + 1e-9):
-                e, damping = step, max(damping / 5, 1e-7)
+                e, seen, damping = step, seen_then, max(damping / 5, 1e-7)
             else:
                 damping *= 10
+            idle = idle + 1 if abs(after - before) < _IDLE * before else 0
+            if idle == 2 and set(widths[place:]) == {width}:
+                break
         return e
 
     def solve_points(self, e: Estimate, iterations: int) -> Estimate:
@@ -165,9 +181,10 @@ class Bundle:
         residual = self.residual(e)
         cost = (residual**2).sum(axis=(0, 2))
         for _ in range(iterations):
-            _, Jx, _ = self._derivatives(e, self.project(e))
-            V = np.einsum("kpia,kpib->pab", Jx, Jx)
-            g = np.einsum("kpia,kpi->pa", Jx, residual)
+            p = self.project(e)
+            Jx = by_points(self._by_point(e, self._by_place(e, p)))
+            V = Jx.transpose(0, 2, 1) @ Jx
+            g = (Jx.transpose(0, 2, 1) @ by_points(residual[..., None]))[:, :, 0]
             V += (damping[:, None] * np.einsum("paa->pa", V) + 1e-9)[:, :, None] * np.eye(3)
             X = e.X - np.linalg.solve(V, g[:, :, None])[:, :, 0]
             behind = X[:, 2] < 0
@@ -190,22 +207,31 @@ class Bundle:
     def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array, Array]:
         """Derivatives of the projections by camera (K, P, 2, 6), point (K, P, 2, 3), lens (K, P, 2, 2); zero
         where unseen."""
-        f = np.exp(e.log_focal)
+        by_q = self._by_place(e, p)
+        by_camera = np.concatenate([-by_q @ skew(p.turned), by_q * e.X[None, :, 2, None, None]], axis=3)
+        square = (p.xy**2).sum(axis=2)
+        by_lens = np.stack([p.u, np.exp(e.log_focal) * p.xy * square[..., None]], axis=3)
+        return by_camera, self._by_point(e, by_q), by_lens * self.seen[..., None, None]
+
+    def _by_place(self, e: Estimate, p: Projection) -> Array:
+        """Derivatives of the projections by q (K, P, 2, 3)."""
         square = (p.xy**2).sum(axis=2)
         by_xy = 2 * e.k1 * p.xy[..., :, None] * p.xy[..., None, :]
         by_xy += (1 + e.k1 * square)[..., None, None] * np.eye(2)
-        by_xy *= (f * self.seen / p.depth)[..., None, None]
-        by_q = np.concatenate([by_xy, -np.einsum("kpij,kpj->kpi", by_xy, p.xy)[..., None]], axis=3)
-        by_camera = np.concatenate([-by_q @ skew(p.turned), by_q * e.X[None, :, 2, None, None]], axis=3)
-        axes = np.stack([e.R[:, :, 0], e.R[:, :, 1], e.t], axis=2)  # dq / d(a, b, rho)
-        by_point = by_q @ axes[:, None]
-        by_lens = np.stack([p.u, f * p.xy * square[..., None]], axis=3) * self.seen[..., None, None]
-        return by_camera, by_point, by_lens
+        by_xy *= (np.exp(e.log_focal) * self.seen / p.depth)[..., None, None]
+        return np.concatenate([by_xy, -np.einsum("kpij,kpj->kpi", by_xy, p.xy)[..., None]], axis=3)
 
-    def _step(self, e: Estimate, residual: Array, width: float, damping: float, translate: bool) -> Estimate:
+    def _by_point(self, e: Estimate, by_q: Array) -> Array:
+        """Derivatives of the projections by (a, b, rho), (K, P, 2, 3)."""
+        axes = np.stack([e.R[:, :, 0], e.R[:, :, 1], e.t], axis=2)  # dq / d(a, b, rho)
+        return np.asarray(by_q @ axes[:, None])
+
+    def _step(
+        self, e: Estimate, p: Projection, residual: Array, width: float, damping: float, translate: bool
+    ) -> Estimate:
         """One damped Gauss-Newton step: points are eliminated, cameras and lens solved, points filled in
         again."""
-        Jc, Jx, Jl = self._derivatives(e, self.project(e))
+        Jc, Jx, Jl = self._derivatives(e, p)
         if not translate:
             Jc[..., 3:] = 0.0
             Jx[..., 2] = 0.0
