@@ -97,9 +97,7 @@ class Cues:
         space = Subspace.fit(W, seen, 3)
         rigid, affine = (each.distance(self.W, self.seen) for each in (space, space.main(W, seen, 2)))
         inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
-        return Group(
-            members, reliable, sample, float(np.median(self.evidence[reliable])), inside, rigid, affine
-        )
+        return Group(members, reliable, sample, _median(self.evidence[reliable]), inside, rigid, affine)
 
     def merge(self, a: Group, b: Group) -> Group:
         """Both as one."""

@@ -30,7 +30,9 @@ def delaunay_edges(xy: NDArray[np.float64]) -> NDArray[np.int64]:
         triangle = np.array([[0, 1, 2]])
         simplices = triangle if len(xy) == 3 else Delaunay(centred / length, qhull_options="QJ Pp").simplices
         edges = np.concatenate([simplices[:, [0, 1]], simplices[:, [1, 2]], simplices[:, [2, 0]]])
-    return np.unique(np.sort(edges, axis=1), axis=0).astype(np.int64)
+    # Of whole numbers np.unique takes a tenth of the time that it takes of rows.
+    low, high = edges.min(axis=1).astype(np.int64), edges.max(axis=1)
+    return np.stack(np.divmod(np.unique(low * len(xy) + high), len(xy)), axis=1)
 
 
 def similarity(tracks: Tracks, edges: NDArray[np.int64], unit: float, sigma: float) -> NDArray[np.float64]:
