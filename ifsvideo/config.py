@@ -148,6 +148,12 @@ class ObjectsConfig:
     least_windows: int = 2
     """Windows that must find an object, where the clip has so many: parallax and slipping corners that look
     like motion in one window seldom do so again in the next, which sees half of the same frames."""
+    least_confidence: float = 0.996
+    """How sure of an object one of these windows must be. In handheld_no_movers.mp4 and the rendered static
+    drive (``python -m ifsvideo.benchmark static``) parallax at the picture's border and what windows mirror
+    reach 0.995; a car or a person is 0.999 as soon as it moves for a second."""
+    alone_confidence: float = 0.9999
+    """How sure a window must be if no other finds the object."""
     least_seconds: float = 0.5
     """What lives shorter is no object; its points go to the background."""
     longest_loss_s: float = 1.0
@@ -187,7 +193,7 @@ class ObjectsConfig:
         ):
             if not getattr(self, name) > 0:
                 raise UsageError(f"objects.{name} must be positive, got {getattr(self, name)}")
-        for name in ("least_life", "fixed_world_share"):
+        for name in ("least_life", "least_confidence", "alone_confidence", "fixed_world_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise UsageError(f"objects.{name} must be 0 to 1, got {getattr(self, name)}")
         for name in (

@@ -14,7 +14,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ifsvideo.ahead import Ahead
 from ifsvideo.clip import Clip, Source, check_outputs, open_clip
@@ -22,8 +21,8 @@ from ifsvideo.config import Config
 from ifsvideo.errors import UsageError
 from ifsvideo.ignore import Area, ignore_mask
 from ifsvideo.objects.labelling import label_frames
-from ifsvideo.objects.shot import Frame, WindowLabels
-from ifsvideo.objects.windows import WindowLabeller, WindowSize
+from ifsvideo.objects.shot import BeginWindow, Frame
+from ifsvideo.objects.windows import WindowLabeller, WindowLabels, WindowSize
 from ifsvideo.output.atomic import Outputs
 from ifsvideo.output.census import Census, TableSink
 from ifsvideo.output.labels import LabelSink
@@ -203,7 +202,7 @@ class Pipeline:
     @contextmanager
     def _segmenting(
         self, clip: Clip, motions: int | None, watch: Stopwatch
-    ) -> Generator[WindowLabels, None, None]:
+    ) -> Generator[BeginWindow, None, None]:
         """What labels windows: in a process of its own, or a thread where that would not pay.
 
         A segmenter of the user's own stays in this process too: it may keep state, and need not be picklable.
@@ -213,11 +212,11 @@ class Pipeline:
         worth = _WORTH_A_PROCESS * WindowSize.at(float(clip.info.fps), config).length
         long = clip.info.frames is None or clip.info.frames >= worth
         with ExitStack() as stack:
-            call: Callable[[Tracks], NDArray[np.int64]] = labeller
+            call: Callable[[Tracks], WindowLabels] = labeller
             if long and isinstance(self.segmenter, IFSSegmenter):
                 call = stack.enter_context(Worker(labeller, "segments"))
 
-            def label(tracks: Tracks) -> NDArray[np.int64]:
+            def label(tracks: Tracks) -> WindowLabels:
                 with watch.stage("segmenting"):
                     return call(tracks)
 

@@ -201,7 +201,8 @@ class Segmentation:
     segments : (P,) int64
         Stage 4: the over-segmentation, -1 where a point was not part of it.
     confidence : (P,) float64
-        How sure the label is: 0 (a guess) to 1.
+        How sure the label is: 0 (a guess) to 1. An object of which no window is sure enough is none
+        (`ifsvideo.config.ObjectsConfig.least_confidence`).
     details : mapping
         Whatever else the stages kept for looking into: merge scores, energies, bounds.
     """

@@ -23,16 +23,18 @@ FPS = 30.0
 
 @dataclass
 class Told:
-    """A segmenter that is told the label of each track, by its id and the number of the window."""
+    """A segmenter that is told the label of each track, by its id and the number of the window, and how sure
+    each window is."""
 
     label: Callable[[np.ndarray, int], np.ndarray]
     windows: int = 0
+    sure: Callable[[int], float] = lambda window: 0.999
 
     def segment(self, tracks: Tracks, motions: int | None = None) -> Segmentation:
         labels = np.asarray(self.label(tracks.ids, self.windows), dtype=np.int64)
+        confidence = np.full(len(labels), self.sure(self.windows))
         self.windows += 1
-        nothing = np.zeros(len(labels))
-        return Segmentation(labels, labels == 0, labels, nothing)
+        return Segmentation(labels, labels == 0, labels, confidence)
 
 
 @dataclass
@@ -119,6 +121,34 @@ def test_a_short_lived_object_goes_to_the_background() -> None:
     assert segmenter.windows > 5
     assert numbers_of(clip, labels, np.arange(10)) == [1]
     assert numbers_of(clip, labels, np.arange(10, 60)) == [0]
+
+
+@pytest.mark.parametrize(("sure", "counts"), [(0.99, False), (0.999, False), (0.99999, True)])
+def test_an_object_of_one_window_counts_if_that_is_very_sure(sure: float, counts: bool) -> None:
+    clip = standing_crowd(frames=150)
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        return np.where((ids < 20) & (window == 3), 1, 0)
+
+    labels = label_clip(clip, Told(label, sure=lambda window: sure), replace(CONFIG, least_seconds=0.1))
+    assert bool((labels > 0).any()) == counts
+
+
+def test_what_no_window_is_sure_of_is_background_and_keeps_its_number_once_one_is() -> None:
+    clip = standing_crowd(frames=150)
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        return np.where(ids < 20, 1, 0)
+
+    def surest_window(number: int, sure: float) -> np.ndarray:
+        return label_clip(clip, Told(label, sure=lambda window: sure if window == number else 0.9), CONFIG)
+
+    assert not surest_window(4, 0.99).any()
+    labels = surest_window(4, 0.999)
+    assert numbers_of(clip, labels, np.arange(20)) == [0, 1]
+    moving = clip.frame[labels > 0]
+    assert 0 < moving.min() < 60  # two windows after the frame, its labels are final
+    assert moving.max() == 149
 
 
 def test_an_object_that_lives_too_short_a_time_goes_too() -> None:

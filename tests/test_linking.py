@@ -195,3 +195,14 @@ def test_an_object_in_sight_is_not_lost_though_a_window_misses_it() -> None:
     linker.link(tracks, np.where(ids < 10, 1, 0))
     found = linker.link(tracks, np.where(ids < 10, 0, 1), start=4)
     assert set(found[10:].tolist()) == {2}
+
+
+def test_an_object_is_as_sure_as_its_surest_window() -> None:
+    linker = Linker(3)
+    ids, ones = np.arange(5), np.ones(5, np.int64)
+    for confidence in (0.7, 0.9, 0.8):
+        linker.link(window(ids), ones, None, np.full(5, confidence))
+    assert linker.surest(1) == 0.9
+    assert linker.surest(2) == 0.0
+    linker.link(window(ids), ones)
+    assert linker.surest(1) == 1.0

@@ -28,7 +28,7 @@ class ByStep:
         step = (tracks.xy[last, points] - tracks.xy[first, points]) / counts[:, None]
         moves = np.abs(step - np.median(step, axis=0)).max(axis=1) > 1.0
         labels = moves.astype(np.int64)
-        return Segmentation(labels, ~moves, labels, np.ones(len(labels)))
+        return Segmentation(labels, ~moves, labels, np.full(len(labels), 0.999))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ifsvideo.objects.standing_camera import add_movers
+from ifsvideo.objects.standing_camera import add_movers, sure_of_added
 from ifsvideo.types import Tracks
 from tests.scenes import SIZE, Camera, Mover, Scene, make_scene
 
@@ -68,6 +68,14 @@ def test_a_small_background_tells_nothing() -> None:
     scene = make_scene(STANDS, (WALKER,), static=30)
     assert not told(scene).any()
     assert told(scene, np.full(scene.tracks.points, -1)).tolist() == [-1] * scene.tracks.points
+
+
+def test_many_tracks_are_surer_than_few() -> None:
+    labels = np.array([0, 1, 1, 2, 2, 2, 2, 3])
+    sure = sure_of_added(labels, np.arange(8) > 0)
+    assert sure[0] == 0
+    assert sure[7] < sure[1] == sure[2] < sure[3] < 1
+    assert not sure_of_added(labels, np.zeros(8, bool)).any()
 
 
 def test_no_tracks() -> None:

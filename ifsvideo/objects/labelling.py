@@ -7,13 +7,13 @@ from itertools import count
 
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.objects.numbering import Numbers
-from ifsvideo.objects.shot import Frame, Shot, WindowLabels
+from ifsvideo.objects.shot import BeginWindow, Frame, Shot
 from ifsvideo.tracking.steps import Step
 
 
 def label_frames(
     steps: Iterable[Step],
-    label: WindowLabels,
+    label: BeginWindow,
     config: ObjectsConfig,
     size: tuple[int, int] | None = None,
     fps: float | None = None,

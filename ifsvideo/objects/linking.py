@@ -46,6 +46,7 @@ class Linker:
     _given: dict[int, Counter[int]] = field(default_factory=dict)
     _guessed: dict[int, Counter[int]] = field(default_factory=dict)
     _windows: Counter[int] = field(default_factory=Counter)
+    _surest: dict[int, float] = field(default_factory=dict)
     _sights: dict[int, Sight] = field(default_factory=dict)
     _next: int = 1
 
@@ -61,6 +62,10 @@ class Linker:
         """Number of windows in which an object was found."""
         return self._windows[number]
 
+    def surest(self, number: int) -> float:
+        """How sure of an object the window was that was surest, 0 to 1."""
+        return self._surest.get(number, 0.0)
+
     def forget(self, alive: NDArray[np.int64]) -> None:
         """Drop what is known of all other tracks: they will not come again."""
         living = set(alive.tolist())
@@ -73,6 +78,7 @@ class Linker:
         tracks: Tracks,
         labels: NDArray[np.int64],
         decided: Bools | None = None,
+        confidence: NDArray[np.float64] | None = None,
         *,
         start: int = 0,
         stride: int = 1,
@@ -87,6 +93,8 @@ class Linker:
         decided : (P,) bool, optional
             Whether the window has decided of the track; the others follow their neighbours, and are no
             evidence of what is one object. By default it has of all.
+        confidence : (P,) float, optional
+            How sure the window is of each label, 0 to 1; of all unless told.
         start : int
             Frame of the clip with which the window begins.
         stride : int
@@ -121,7 +129,10 @@ class Linker:
         for k in np.flatnonzero(linked > BACKGROUND).tolist():
             evidence = self._given if sure[k] else self._guessed
             evidence.setdefault(int(tracks.ids[k]), Counter())[int(linked[k])] += 1
-        self._windows.update(np.unique(linked[linked > BACKGROUND]).tolist())
+        for number in np.unique(linked[linked > BACKGROUND]).tolist():
+            self._windows[number] += 1
+            here_sure = 1.0 if confidence is None else float(confidence[linked == number].max())
+            self._surest[number] = max(self.surest(number), here_sure)
         self._sights |= lost | {number_for[label]: sight for label, sight in sights.items()}
         self._sights = {n: s for n, s in self._sights.items() if start - s.last <= self.longest_loss}
         return linked

@@ -15,24 +15,24 @@ from ifsvideo.objects.camera_fixed import CameraFixed
 from ifsvideo.objects.figure_ground import FigureGround
 from ifsvideo.objects.linking import Linker
 from ifsvideo.objects.numbering import Numbers
-from ifsvideo.objects.windows import Bounds, Windows, WindowSize, gather, long_enough
+from ifsvideo.objects.windows import Bounds, WindowLabels, Windows, WindowSize, gather, long_enough
 from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Tracks
 from ifsvideo.video.picture import Picture
 
 
 class Promise(Protocol):
-    """Labels of a window's tracks that are being made."""
+    """Labels of a window that are being made."""
 
     def done(self) -> bool:
         """Whether they are there."""
         ...
 
-    def value(self) -> NDArray[np.int64]:
-        """The labels (P,), once they are there: 0 background, 1, 2, ... moving, -1 undecided."""
+    def value(self) -> WindowLabels:
+        """The labels, once they are there."""
         ...
 
 
-WindowLabels = Callable[[Tracks], Promise]
+BeginWindow = Callable[[Tracks], Promise]
 """Begins to label the tracks of a window."""
 
 _UNDER_WAY = 2
@@ -93,7 +93,7 @@ class Shot:
 
     def __init__(
         self,
-        label: WindowLabels,
+        label: BeginWindow,
         numbers: Numbers,
         config: ObjectsConfig,
         size: tuple[int, int] | None,
@@ -163,8 +163,9 @@ class Shot:
         """Link a window; that makes the labels of earlier frames final."""
         stride = self._window_size.stride
         decided = long_enough(window.tracks, self._config)
+        said = window.labels.value()
         found = self._linker.link(
-            window.tracks, window.labels.value(), decided, start=window.bounds[0], stride=stride
+            window.tracks, said.labels, decided, said.confidence, start=window.bounds[0], stride=stride
         )
         self._linked.append((window.bounds, window.tracks.ids, found))
         if len(self._linked) > 1:
@@ -210,7 +211,8 @@ class Shot:
     ) -> list[NDArray[np.int64]]:
         """Labels (N,) of each frame as far as is known by now; objects as the linker numbers them.
 
-        What too few windows found is background, and so are tracks that show the ground.
+        What windows found too seldom or were not sure of is background, and so are tracks that show the
+        ground.
         """
         if not frames:
             return []
@@ -220,10 +222,17 @@ class Shot:
         tracks, place = np.unique(ids[moving], return_inverse=True)
         linker = self._linker
         numbers = np.array([linker.number_of(track) or BACKGROUND for track in tracks.tolist()], np.int64)
-        found_in = np.array([linker.windows_of(number) for number in numbers.tolist()], np.int64)
-        numbers[found_in < self._least_windows] = BACKGROUND
+        counts = [self._counts(number) for number in numbers.tolist()]
+        numbers[~np.array(counts, bool)] = BACKGROUND
         if on_ground is not None:
             numbers[np.isin(tracks, on_ground)] = BACKGROUND
         labels[moving] = numbers[place]
         labels[np.isin(ids, self._fixed.ids)] = UNDECIDED
         return np.split(labels, np.cumsum([len(frame.labels) for frame in frames])[:-1])
+
+    def _counts(self, number: int) -> bool:
+        """Whether an object was found by enough windows, one of which was sure enough, or by one that was
+        surer than that."""
+        surest = self._linker.surest(number)
+        lasting = self._linker.windows_of(number) >= self._least_windows
+        return surest >= (self._config.least_confidence if lasting else self._config.alone_confidence)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
 
-from ifsvideo.types import BACKGROUND, Tracks
+from ifsvideo.types import BACKGROUND, Bools, Tracks
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,8 @@ _NEAR, _SLIP, _ALIKE = 35.0, 0.5, 0.5
 pixels a frame and share of the faster: limbs of one who walks."""
 _LEAST_TRACKS = 2
 """Fewest tracks of a thing that no window told of."""
+_SLIPPED = 0.05
+"""How often a track that departs is none of a thing that moves."""
 
 
 def add_movers(
@@ -81,6 +83,17 @@ def add_movers(
         number = max(BACKGROUND, int(labels.max())) + np.cumsum(counts)
         result[new[counts[thing]]] = number[thing][counts[thing]]
     return result
+
+
+def sure_of_added(labels: NDArray[np.int64], added: Bools) -> Array:
+    """How sure `add_movers` is of the labels (P,) of the tracks that it added (P,), 0 for all others.
+
+    Each may have slipped along an outline or an edge, but they do so one by one.
+    """
+    sure = np.zeros(len(labels))
+    _, thing, count = np.unique(labels[added], return_inverse=True, return_counts=True)
+    sure[added] = (1 - _SLIPPED**count)[thing]
+    return sure
 
 
 def _departures(tracks: Tracks, ground: NDArray[np.int64], unit: float) -> Array | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.objects.standing_camera import add_movers
+from ifsvideo.objects.standing_camera import add_movers, sure_of_added
 from ifsvideo.types import BACKGROUND, UNDECIDED, Bools, FramePoints, Segmenter, Tracks
 
 _REACH = 35.0
@@ -109,6 +109,22 @@ def long_enough(tracks: Tracks, config: ObjectsConfig) -> Bools:
 
 
 @dataclass(frozen=True)
+class WindowLabels:
+    """What a window says of its tracks.
+
+    Attributes
+    ----------
+    labels : (P,) int64
+        0 background, 1, 2, ... moving, -1 undecided.
+    confidence : (P,) float64
+        As in `ifsvideo.types.Segmentation`; 0 where a track only follows others.
+    """
+
+    labels: NDArray[np.int64]
+    confidence: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class WindowLabeller:
     """Labels all tracks of a window: those that last are segmented, the others follow their neighbours.
 
@@ -124,17 +140,21 @@ class WindowLabeller:
     config: ObjectsConfig
     motions: int | None = None
 
-    def __call__(self, tracks: Tracks) -> NDArray[np.int64]:
-        """Labels (P,): 0 background, 1, 2, ... moving, -1 undecided."""
+    def __call__(self, tracks: Tracks) -> WindowLabels:
+        """Label every track of a window."""
         lasting = np.flatnonzero(long_enough(tracks, self.config))
+        confidence = np.zeros(tracks.points)
         if not len(lasting):
-            return np.full(tracks.points, UNDECIDED, dtype=np.int64)
-        labels = self.segmenter.segment(tracks.select(lasting), self.motions).labels
+            return WindowLabels(np.full(tracks.points, UNDECIDED, dtype=np.int64), confidence)
+        found = self.segmenter.segment(tracks.select(lasting), self.motions)
+        # Who knows the number of motions has said that there are so many.
+        confidence[lasting] = found.confidence if self.motions is None else 1.0
         unit = float(np.hypot(*tracks.size)) / 800 if tracks.size else 1.0
-        labels = follow_neighbours(tracks, lasting, labels, unit)
+        labels = followed = follow_neighbours(tracks, lasting, found.labels, unit)
         if self.motions is None:
-            labels = add_movers(tracks, lasting, labels, unit)
-        return follow_all_round(tracks, labels, unit)
+            labels = add_movers(tracks, lasting, followed, unit)
+            confidence = np.maximum(confidence, sure_of_added(labels, labels != followed))
+        return WindowLabels(follow_all_round(tracks, labels, unit), confidence)
 
 
 def follow_neighbours(
