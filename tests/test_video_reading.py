@@ -19,6 +19,8 @@ from ifsvideo.errors import IfsVideoError, InputError, UsageError
 from ifsvideo.types import Image
 from ifsvideo.video import FrameSource, open_source, parse_time
 
+from .conftest import encode, pictures
+
 ODD = Path(__file__).resolve().parents[2] / "shared" / "videos" / "odd"
 LOSSLESS = ("-c:v", "libx264", "-qp", "0", "-pix_fmt", "yuv444p")
 Make = Callable[..., Path]
@@ -455,3 +457,13 @@ def test_odd_clips_from_the_wild(name: str, size: tuple[int, int], fps: str, fra
 def test_unreadable_clips_from_the_wild(name: str) -> None:
     with pytest.raises(InputError):
         open_source(ODD / name)
+
+
+def test_a_script_may_end_in_the_middle_of_a_video(tmp_path: Path) -> None:
+    clip = encode(tmp_path / "clip.mp4", pictures(1) * 300)
+    script = "import sys, pathlib, ifsvideo.video as v; source = v.open_source(pathlib.Path(sys.argv[1]));"
+    script += "frames = source.frames(); next(frames); print('seen')"
+    done = subprocess.run(
+        [sys.executable, "-c", script, clip], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "seen\n", "")

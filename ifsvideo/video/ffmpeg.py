@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import threading
+import weakref
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
@@ -71,6 +72,8 @@ class Ffmpeg:
         self._lines: deque[str] = deque(maxlen=_KEPT_LINES)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
+        # Also where Python ends before the context does: it must not find a thread that reads from a child.
+        self._end = weakref.finalize(self, _end, self._process, self._listener)
 
     def _listen(self) -> None:
         assert self._process.stderr is not None
@@ -112,10 +115,7 @@ class Ffmpeg:
 
     def stop(self) -> None:
         """Kill the child if it still runs, reap it, close the pipes."""
-        if self._process.poll() is None:
-            self._process.kill()
-        self._process.wait()
-        self._listener.join()
+        self._end()
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
                 with suppress(BrokenPipeError):  # what was still buffered for a dead child is lost
@@ -128,6 +128,13 @@ class Ffmpeg:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+def _end(process: subprocess.Popen[bytes], listener: threading.Thread) -> None:
+    if process.poll() is None:
+        process.kill()
+    process.wait()
+    listener.join()
 
 
 def run(arguments: Sequence[str]) -> tuple[int, str, list[str]]:
