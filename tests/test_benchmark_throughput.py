@@ -27,6 +27,7 @@ def test_the_report_holds_what_is_promised(clips, tmp_path, capsys):
     assert report["points"] == 60
     assert report["ratio"] == pytest.approx(report["floor_fps"] / report["fps"])
     assert set(report["stages"]) == {"reading", "tracking", "segmenting", "linking", "writing"}
+    assert report["cpu_ms"] > report["floor_cpu_ms"] > 0
     assert report["peak_rss_mb"] > 50
     out = capsys.readouterr().out
     for word in ("tracking", "ratio", "floor", "peak memory"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -35,6 +36,7 @@ The floor (throughput_floor.py) decodes, finds corners, tracks them forward and 
 else. Ratio: how many times longer the program takes. Each runs in a process of its own that is started
 before its time begins. Without video: the same, nothing encoded.
 Stages: seconds of the program's median run; they run side by side, so that their sum is more than the whole.
+Processors: what all processes of either take together; it says more where something else runs beside.
 Peak: resident memory of all processes of the program together (pages that they share count for each),
 sampled five times a second. Slope: its growth after the first minute of the clip, per minute of the clip;
 none of a shorter clip.
@@ -56,11 +58,13 @@ class Program:
 
 @dataclass(frozen=True)
 class Measured:
-    """One run of either: frames, seconds, seconds of each stage; peak (MB) and slope (MB/s) of memory."""
+    """One run of either: frames, seconds, seconds of each stage, processor seconds of all processes; peak (MB)
+    and slope (MB/s) of memory."""
 
     frames: int
     seconds: float
     stages: dict[str, float]
+    cpu: float
     peak: float = 0.0
     slope: float | None = None
 
@@ -73,14 +77,21 @@ class Measured:
 def run_program(task: Program) -> Measured:
     """The program as the command runs it."""
     pipeline = Pipeline(task.config)
-    begun = time.perf_counter()
+    begun, cpu = time.perf_counter(), _cpu()
     result = pipeline.run(task.clip, task.output, task.labels, keep_table=False)
-    return Measured(result.counts.frames, time.perf_counter() - begun, dict(result.seconds))
+    return Measured(result.counts.frames, time.perf_counter() - begun, dict(result.seconds), _cpu() - cpu)
 
 
 def run_floor(task: Floor) -> Measured:
     """The floor."""
-    return Measured(*throughput_floor.run(task), {})
+    cpu = _cpu()
+    frames, seconds = throughput_floor.run(task)
+    return Measured(frames, seconds, {}, _cpu() - cpu)
+
+
+def _cpu() -> float:
+    """Processor seconds of this process and of its children that have ended."""
+    return sum(os.times()[:4])
 
 
 def in_a_process(function: Callable[[Any], Measured], task: Any, late: float) -> Measured:
@@ -138,6 +149,8 @@ def run_throughput(
         "fps": fps,
         "floor_fps": floor_fps,
         "ratio": floor_fps / fps,
+        "cpu_ms": 1e3 * median(run.cpu / run.frames for run in own),
+        "floor_cpu_ms": 1e3 * median(run.cpu / run.frames for run in floor),
         "peak_rss_mb": max(run.peak for run in own),
         "slope_mb_per_minute": slope,
         "stages": {name: round(seconds, 3) for name, seconds in typical.stages.items()},
@@ -264,6 +277,7 @@ def _in_words(report: Report) -> str:
         table.align(("stage", "seconds", "ms a frame"), rows),
         "",
         f"program {report['fps']:.1f} frames/s, floor {report['floor_fps']:.1f}, ratio {report['ratio']:.2f}",
+        f"processors, ms a frame: program {report['cpu_ms']:.0f}, floor {report['floor_cpu_ms']:.0f}",
         f"peak memory {report['peak_rss_mb']:.0f} MB{growth}",
     ]
     return "\n".join(lines)
