@@ -58,8 +58,8 @@ class Program:
 
 @dataclass(frozen=True)
 class Measured:
-    """One run of either: frames, seconds, seconds of each stage, processor seconds of all processes; peak (MB)
-    and slope (MB/s) of memory."""
+    """One run of either: frames, seconds, seconds of each stage, processor seconds of all processes together;
+    peak (MB) and slope (MB/s) of memory."""
 
     frames: int
     seconds: float
