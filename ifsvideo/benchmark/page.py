@@ -61,11 +61,15 @@ def scenes(objects: int, frames: int, seed: int = 0) -> Iterator[Scene]:
         yield past.next(points, labels.astype(np.int32))
 
 
-def picture(frame: int) -> Image:
-    """A wall of soft colours that goes by."""
-    x, y = np.meshgrid(np.arange(_INFO.width) + 2.0 * frame, np.arange(_INFO.height), sparse=True)
-    grey: NDArray[np.float64] = 128 + 50 * np.sin(x / 23) + 50 * np.sin(y / 17)
-    return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
+def wall(frames: int) -> Iterator[Image]:
+    """Pictures of a wall of soft colours that goes by, and begins anew."""
+    x, y = np.meshgrid(np.arange(2 * _INFO.width), np.arange(_INFO.height), sparse=True)
+    turns = 2 * np.pi * 4 / _INFO.width
+    grey: NDArray[np.float64] = 128 + 50 * np.sin(turns * x) + 50 * np.sin(y / 17)
+    wide = np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
+    for frame in range(frames):
+        left = 2 * frame % _INFO.width
+        yield np.ascontiguousarray(wide[:, left : left + _INFO.width])
 
 
 def write_page(path: Path, objects: int, frames: int, quiet: bool = False) -> None:
@@ -73,8 +77,8 @@ def write_page(path: Path, objects: int, frames: int, quiet: bool = False) -> No
     with Outputs() as outputs:
         history = ObjectHistory(_INFO, thumbnails=True)
         sink = ReportSink(path, "made up", _INFO, history, outputs)
-        for scene in tqdm(scenes(objects, frames), total=frames, unit="frame", disable=quiet, leave=False):
-            image = picture(scene.frame)
+        clip = zip(scenes(objects, frames), wall(frames), strict=False)
+        for scene, image in tqdm(clip, total=frames, unit="frame", disable=quiet, leave=False):
             history.add(scene, image)
             sink.add(scene, image)
         history.finish()
