@@ -34,7 +34,8 @@ def test_a_page_is_measured(monkeypatch, capsys, tmp_path, here):
     out = capsys.readouterr().out
     assert out.startswith("page: 1 minutes, 4 objects\n\nsize: 0.")
     report = json.loads(figures.read_text())
-    assert report["bytes"] > 20_000
+    assert 20_000 < report["bytes"] < 200_000
+    assert report["embedded_video_bytes"] > 3_000
     assert len(report["seconds"]) == (2 if here else 0)
     assert ("median of 2" in out) == here
     assert ("not measured" in out) != here

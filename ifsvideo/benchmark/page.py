@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import time
 from collections.abc import Iterator
 from fractions import Fraction
@@ -27,7 +28,7 @@ _HELP = """\
 Write the page of a clip that is made up, and open it in Chromium, headless.
 
 The clip is 640x360 at 25 frames a second; each object is 20 points that are in sight for a tenth of it, or
-for two seconds, and move, and grow or shrink. Size: of the page, without a video that stands beside it.
+for two seconds, and move, and grow or shrink. Size: of the page, without its video.
 Seconds: from the address to the load event and the video's first picture, median of the runs. Without
 chromium and chromedriver (Debian's packages chromium and chromium-driver) only the size is told.
 """
@@ -106,7 +107,10 @@ def run_page(objects: int, minutes: float, runs: int, quiet: bool = False) -> Re
         write_page(page, objects, frames, quiet)
         seconds = opening_times(page, runs) if browser.HERE else []
         size = page.stat().st_size
-    return {"objects": objects, "minutes": minutes, "runs": runs, "bytes": size, "seconds": seconds}
+        embedded = re.search('src="(data:video/[^"]*)"', page.read_text(encoding="utf-8"))
+        video = len(embedded[1]) if embedded else 0
+    figures = {"bytes": size - video, "embedded_video_bytes": video, "seconds": seconds}
+    return {"objects": objects, "minutes": minutes, "runs": runs, **figures}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -136,4 +140,5 @@ def as_table(report: Report) -> str:
     if report["seconds"]:
         opened = f"{median(report['seconds']):.2f} s, median of {report['runs']}"
     title = f"page: {report['minutes']} minutes, {report['objects']} objects"
-    return f"{title}\n\nsize: {report['bytes'] / 1e6:.2f} MB\nopen after: {opened}"
+    size = f"{report['bytes'] / 1e6:.2f} MB, and {report['embedded_video_bytes'] / 1e6:.2f} MB of video in it"
+    return f"{title}\n\nsize: {size}\nopen after: {opened}"
