@@ -224,6 +224,7 @@ class TestDrives:
         ).events
         assert [event.kind for event in told] == ["appears", "comes closer fast", "leaves"]
         assert told[0].text == "object 1 is in sight at the beginning"
+        assert told[1].text in [f"object 1 comes closer fast: contact in {t} s" for t in (2.8, 2.9, 3.0)]
         assert [event.time_s for event in told] == pytest.approx([0.0, 0.0, 2.87], abs=0.1)
 
     def test_what_stood_before_is_not_said_to_come_closer_since_then(self):

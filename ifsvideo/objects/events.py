@@ -124,8 +124,8 @@ def events_of(sights: Sights, info: VideoInfo) -> Iterator[Event]:
         side = _passing(sights, info) if side_in else None
         if side is not None:
             yield event(first, "overtakes", f"overtakes on the {side}")
-    for frame, row in _closing(sights, fps):
-        yield event(frame, "comes closer fast", f"comes closer fast: contact in {rows.ttc_s[row]:.1f} s")
+    for frame, contact_s in _closing(sights, fps):
+        yield event(frame, "comes closer fast", f"comes closer fast: contact in {contact_s:.1f} s")
     crossed = _crossing(rows, info)
     if crossed is not None:
         row, way = crossed
@@ -261,16 +261,18 @@ def _goes_our_way(sights: Sights, part: slice, info: VideoInfo) -> bool:
     return bool(pace > _PACE * own and moved <= _RADIAL * explained)
 
 
-def _closing(sights: Sights, fps: float) -> Iterator[tuple[int, int]]:
-    """Frames in which contact begins to be near, and the rows that tell so."""
+def _closing(sights: Sights, fps: float) -> Iterator[tuple[int, float]]:
+    """Frames in which contact begins to be near, and the time to it then, seconds."""
+    rows = sights.rows
     lasting = max(2, round(_LASTING_S * fps))
-    soon = sights.rows.ttc_s < _CONTACT_S
+    soon = rows.ttc_s < _CONTACT_S
     told = -np.inf
     for row in np.flatnonzero(soon).tolist():
         if row - told < _QUIET_S * fps:
             told = row
         elif soon[row : row + lasting].sum() >= 0.8 * lasting:
-            yield _onset(sights, row, fps), row
+            frame = _onset(sights, row, fps)
+            yield frame, float(rows.ttc_s[row] + (rows.frame[row] - frame) / fps)
             told = row
 
 
