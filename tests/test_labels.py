@@ -5,6 +5,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from ifsvideo.errors import OutputError
@@ -43,6 +44,19 @@ def test_text_is_exactly_the_contract(tmp_path):
 def test_no_rows_is_a_header_alone(tmp_path):
     write(tmp_path / "a.csv", [])
     assert (tmp_path / "a.csv").read_text() == HEADER + "\n"
+
+
+def test_pandas_reads_it(tmp_path):
+    write(
+        tmp_path / "a.csv", [scene(0, [3, 12], [[1, 2], [3.25, -4]], [0, -1]), scene(1, [3], [[5, 6]], [2])]
+    )
+    read = pd.read_csv(tmp_path / "a.csv")
+    assert read.dtypes.astype(str).to_dict() == {
+        **dict.fromkeys(("frame", "track_id", "label"), "int64"),
+        **dict.fromkeys(("time_s", "x", "y"), "float64"),
+    }
+    assert read.groupby("track_id").size().to_dict() == {3: 2, 12: 1}
+    assert read.loc[read["label"] == -1, ["x", "y"]].to_numpy().tolist() == [[3.25, -4.0]]
 
 
 def test_every_row_arrives_in_order(tmp_path):

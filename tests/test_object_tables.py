@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from ifsvideo.objects.history import ObjectTable
@@ -35,6 +36,22 @@ def test_the_csv_holds_the_table(table, tmp_path):
         read = np.array([float(row[name]) for row in rows if row[name]])
         np.testing.assert_allclose(read, column[~empty], atol=0.00501)
     assert (rows[10]["ttc_s"] != "", rows[40]["ttc_s"]) == (True, "")
+
+
+def test_pandas_reads_both(table, tmp_path):
+    with Outputs() as outputs:
+        write_objects(tmp_path / "o.csv", table, outputs)
+        write_mot(tmp_path / "m.txt", table, outputs)
+    read = pd.read_csv(tmp_path / "o.csv")
+    whole = {"frame", "object", "points"}
+    assert {name: kind.kind for name, kind in read.dtypes.items()} == {
+        name: "i" if name in whole else "f" for name in read.columns
+    }
+    assert read["ttc_s"].isna().sum() == np.isnan(table.ttc_s).sum() > 0
+    assert (read["ttc_s"].dropna() > 0).all()
+    boxes = pd.read_csv(tmp_path / "m.txt", header=None)
+    assert boxes.shape == (50, 10)
+    np.testing.assert_allclose(boxes[4], read["width"], atol=0.011)
 
 
 def test_nothing_moves_gives_the_header_alone(tmp_path):
