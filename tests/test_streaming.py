@@ -385,7 +385,7 @@ def test_a_disk_that_fills_up_ends_the_run(long_clip) -> None:
         text=True,
         check=False,
         timeout=60,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)),
     )
     assert done.returncode == 4
     assert "clip.ifs." in done.stderr.splitlines()[-1]
