@@ -183,6 +183,16 @@ def test_plots_follow_the_choice(page):
     assert 0.5 < time_of(page) < 2.6
 
 
+def test_dots_lie_within_the_timeline(page):
+    outside = """
+    const all = document.getElementById('lanes').getBoundingClientRect();
+    const box = e => e.getBoundingClientRect(), dots = [...document.querySelectorAll('#lanes .event')];
+    return dots.filter(e => box(e).left < all.left || box(e).right > all.right).length
+    """
+    assert page.run("return document.querySelectorAll('#lanes .event').length") >= 2
+    assert page.run(outside) == 0
+
+
 def test_an_address_can_name_a_moment(window, pages):
     window.open("about:blank")
     window.open(pages["two"].as_uri() + "#t=1.25")

@@ -4,9 +4,11 @@ const timeline = $("timeline"), lanes = $("lanes");
 const percent = seconds => `${100 * Math.min(Math.max(seconds / duration, 0), 1)}%`;
 const laneOf = [];
 for (const object of objects) {
-  let lane = laneOf.findIndex(end => end < object.first);
+  // Events may be a little before and after the sight of which they tell.
+  const times = object.events.map(([time]) => time);
+  let lane = laneOf.findIndex(end => end < Math.min(object.first, ...times));
   if (lane < 0) lane = laneOf.length;
-  laneOf[lane] = object.last + 0.004 * duration;
+  laneOf[lane] = Math.max(object.last, ...times) + 0.004 * duration;
   object.lane = lane;
 }
 const laneHeight = laneOf.length > 8 ? 12 : 20;
@@ -22,7 +24,7 @@ for (const object of objects) {
   lanes.append(bar);
   for (const [time, , words] of object.events) {
     const dot = make("div", {className: "event", title: `${clockText(time)} ${words}`});
-    Object.assign(dot.style, {left: percent(outputTime(time)), top: `${object.lane * laneHeight + laneHeight / 2 - 3.5}px`});
+    Object.assign(dot.style, {left: `clamp(4px, ${percent(outputTime(time))}, 100% - 4px)`, top: `${object.lane * laneHeight + laneHeight / 2 - 3.5}px`});
     lanes.append(dot);
   }
 }
