@@ -31,11 +31,6 @@ COLLAPSED = 0.4
 """Share of the least distance of corners below which two tracks follow the same thing."""
 
 
-CHECKED_TOGETHER = 4
-"""Frames whose tracks are compared with the patches of their birth at once: many take little more time than
-few."""
-
-
 def tracked_size(width: int, height: int, scale: float = 1.0) -> tuple[int, int]:
     """Width and height in which a picture is tracked: ``scale`` times its own, halved while that is large."""
     while math.hypot(width, height) * scale > LARGEST:
@@ -145,11 +140,7 @@ class _Life:
 
     def _faithful(self, grey: Image) -> Bools:
         """Whether each track still sees what it saw at birth; those whose turn it is are checked."""
-        interval = self.config.check_interval
-        together = min(CHECKED_TOGETHER, interval)
-        if self.frame % together:
-            return np.ones(len(self.ids), bool)
-        turn = np.flatnonzero((self.ids + self.frame) % interval < together)
+        turn = np.flatnonzero((self.ids + self.frame) % self.config.check_interval == 0)
         verdict = self.references.check(grey, self.xy[turn], turn)
         faithful = np.ones(len(self.ids), bool)
         faithful[turn] = verdict.similarity >= self.config.min_resemblance
