@@ -10,7 +10,7 @@ import pytest
 
 from ifsvideo.objects.boxes import point_box, steady_boxes
 from ifsvideo.objects.contact import contact, stretch
-from ifsvideo.objects.events import KINDS
+from ifsvideo.objects.events import KINDS, over_edge
 from ifsvideo.objects.history import ObjectHistory, ObjectTable
 from ifsvideo.objects.kinematics import foot_step, steps, velocity
 from ifsvideo.types import Scene
@@ -244,6 +244,12 @@ class TestDrives:
             "object 1 leaves on the right",
         ]
         assert told[0].time_s == pytest.approx(0.65, abs=0.15), "when it was wholly in the picture"
+
+    def test_what_stood_and_is_carried_out_of_the_picture_left_it(self):
+        rows = history(drive(lambda t: (-1.5, 12.0, 0.0), speed=0.0, seconds=0.4, noise=0)).table.of(1)
+        still = replace(rows, cx=np.full_like(rows.cx, rows.cx[0]))
+        assert over_edge(still, 1, np.array([-400.0, 0.0]), INFO) == (0, "left")
+        assert over_edge(still, 1, np.zeros(2), INFO) == (0, None)
 
     def test_a_car_that_crosses_while_we_drive_is_not_overtaken(self):
         told = kinds(drive(lambda t: (-14.0 + 9.5 * t, 26.0, math.pi / 2), speed=3.0))

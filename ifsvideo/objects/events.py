@@ -148,7 +148,7 @@ def _coming(sights: Sights, info: VideoInfo) -> tuple[int, str | None]:
     if sights.before.lasts:
         return sights.first, None
     near = sights.rows.select(np.arange(_near(sights.rows, info)))
-    beyond, side = _over_edge(near, -1, sights.before.shift, info)
+    beyond, side = over_edge(near, -1, sights.before.shift, info)
     first = sights.first - beyond
     at_once = first - sights.shot[0] <= _EDGE_S * float(info.fps)
     return (sights.shot[0], None) if at_once else (first, side)
@@ -159,7 +159,7 @@ def _going(sights: Sights, info: VideoInfo) -> tuple[int, str | None]:
     if sights.after.lasts:
         return sights.last, None
     near = sights.rows.select(np.arange(len(sights.rows))[-_near(sights.rows, info) :])
-    beyond, side = _over_edge(near, 1, sights.after.shift, info)
+    beyond, side = over_edge(near, 1, sights.after.shift, info)
     return min(sights.shot[1] - 1, sights.last + beyond), side
 
 
@@ -168,7 +168,7 @@ def _near(rows: ObjectTable, info: VideoInfo) -> int:
     return min(len(rows), max(1, round(_NEAR_S * float(info.fps))))
 
 
-def _over_edge(
+def over_edge(
     rows: ObjectTable, towards: int, shift: NDArray[np.float64], info: VideoInfo
 ) -> tuple[int, str | None]:
     """Whether an object leaves the picture, or came into it, and how soon its box is on the edge.
@@ -207,7 +207,8 @@ def _over_edge(
         out = float(middle[end]) + step + speed * _OUT_S > 0
         if (out or touches) and (found is None or speed > best):
             best, found = speed, side
-            soon = 0.0 if touches else min(_OUT_S, max(0.0, -(float(outer[end]) + step) / speed))
+            still = touches or speed <= 0
+            soon = 0.0 if still else min(_OUT_S, max(0.0, -(float(outer[end]) + step) / speed))
     return round(soon * fps), found
 
 
