@@ -92,13 +92,13 @@ def test_a_single_sight_has_no_motion_to_compare() -> None:
     assert follow_neighbours(Tracks.from_array(xy), decided, kind[decided], 1.0)[0] == -1
 
 
-def seen_once(label_of_the_last: int, far: float = 0.0) -> int:
-    """Label of a point that is seen once, in the middle of four tracks, three of which are background."""
+def seen_once(label_of_the_last: int, far: float = 0.0, label: int = 0) -> int:
+    """Label of a point that is seen once, in the middle of four tracks, three of which have a label."""
     around = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [9.0, 9.0], [4.0 + far, 5.0]])
     xy = np.repeat(around[None], 10, axis=0)
     visible = np.ones((10, 5), bool)
     visible[:, 4] = np.arange(10) == 7
-    labels = np.array([0, 0, 0, label_of_the_last, -1])
+    labels = np.array([label] * 3 + [label_of_the_last, -1])
     return int(follow_all_round(Tracks.from_array(xy, visible), labels, 1.0)[4])
 
 
@@ -106,7 +106,13 @@ def test_a_single_sight_is_what_is_all_round_it() -> None:
     assert seen_once(0) == 0
     assert seen_once(1) == -1  # not all agree
     assert seen_once(-1) == -1  # not all know
-    assert seen_once(0, far=40.0) == -1  # they are not round it
+    assert seen_once(0, far=40.0) == -1  # they are far away
+
+
+def test_beside_an_object_a_single_sight_is_not_part_of_it() -> None:
+    assert seen_once(3, label=3) == 3
+    assert seen_once(3, far=16.0, label=3) == -1
+    assert seen_once(0, far=16.0, label=0) == 0
 
 
 def test_an_objects_label_is_not_carried_far() -> None:

@@ -192,7 +192,8 @@ def follow_neighbours(
 def follow_all_round(tracks: Tracks, labels: NDArray[np.int64], unit: float) -> NDArray[np.int64]:
     """Labels of all tracks of a window, those seen in a single frame by what is all round them there.
 
-    Their motion is not known: they take a label only where all of the nearest tracks agree on it.
+    Their motion is not known: they take a label only where all of the nearest tracks agree on it, and an
+    object's only where these do not all lie on one side: most of what lies beside an object is none of it.
 
     Parameters
     ----------
@@ -211,8 +212,17 @@ def follow_all_round(tracks: Tracks, labels: NDArray[np.int64], unit: float) -> 
         distance, index = cKDTree(tracks.xy[frame, near]).query(tracks.xy[frame, asked], k=_ALL_ROUND)
         votes = labels[near[index]]
         agreed = (np.ptp(votes, axis=1) == 0) & (np.max(distance, axis=1) <= _REACH * unit)
+        beside = _in_one_quarter(tracks.xy[frame, near[index]] - tracks.xy[frame, asked, None])
+        agreed &= ~beside | (votes[:, 0] == BACKGROUND)
         result[asked[agreed]] = votes[agreed, 0]
     return result
+
+
+def _in_one_quarter(to_neighbours: NDArray[np.float64]) -> Bools:
+    """Whether points see all their neighbours within a right angle, given the ways (N, K, 2) there."""
+    angle = np.sort(np.arctan2(to_neighbours[..., 1], to_neighbours[..., 0]), axis=1)
+    gap = np.diff(angle, axis=1, append=angle[:, :1] + 2 * np.pi)
+    return np.asarray(gap.max(axis=1) > 1.5 * np.pi, bool)
 
 
 def _votes(
