@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ifsvideo.segmentation.agglomeration import Agglomeration, parts_of
+from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.cues import CUES, Cues
 from ifsvideo.segmentation.similarity import Similarity, feature_names, learnt
-from ifsvideo.segmentation.world import static_evidence
+from ifsvideo.segmentation.world import fit_world
 from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, Mover, Scene, make_scene
 
@@ -20,8 +20,10 @@ def cut(scene: Scene, width: float = 80.0) -> np.ndarray:
 
 
 def start(scene: Scene, rule: Similarity | None = None) -> Agglomeration:
-    evidence, _ = static_evidence(scene.tracks, SIZE, 5.0, np.random.default_rng(0))
-    return Agglomeration(Cues(scene.tracks, scene.tracks.xy[0], evidence, 1.0, 10), rule or learnt())
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    assert world is not None
+    cues = Cues(scene.tracks, scene.tracks.xy[0], world.evidence(5.0), world.nearness, 1.0, 10)
+    return Agglomeration(cues, rule or learnt().core)  # the rule for the world of stage 1
 
 
 def rule(**weights: float) -> Similarity:
@@ -30,8 +32,8 @@ def rule(**weights: float) -> Similarity:
     return Similarity(np.array([weights.get(name, 0.0) for name in names]))
 
 
-def everything(segments: np.ndarray) -> np.ndarray:
-    return np.ones(len(segments), dtype=bool)
+def window(segments: np.ndarray, explained: np.ndarray | None = None) -> Window:
+    return Window(segments, np.ones(len(segments), dtype=bool) if explained is None else explained, SIZE)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -39,7 +41,7 @@ def test_one_rigid_scene_is_one_motion(seed: int) -> None:
     scene = make_scene(Camera.path(step=(0.1, 0, 0.2)), seed=seed)
     segments = cut(scene)
     assert len(np.unique(segments)) > 5
-    (group,) = start(scene).run(segments, everything(segments), None)
+    (group,) = start(scene).run(window(segments))
     assert sorted(group.members) == list(range(scene.tracks.points))
 
 
@@ -48,7 +50,7 @@ def test_one_rigid_scene_is_one_motion(seed: int) -> None:
 def test_what_clearly_moves_stays_apart(cars: tuple[Mover, ...], seed: int) -> None:
     scene = make_scene(movers=cars, seed=seed)
     segments = cut(scene)
-    groups = start(scene).run(segments, everything(segments), None)
+    groups = start(scene).run(window(segments))
     found = sorted((sorted(group.members) for group in groups), key=lambda members: members[0])
     assert found == [np.flatnonzero(scene.truth == k).tolist() for k in range(len(cars) + 1)]
 
@@ -58,7 +60,7 @@ def test_a_known_number_of_motions_is_kept(motions: int) -> None:
     scene = make_scene(movers=(LEFT_CAR, RIGHT_CAR))
     segments = cut(scene)
     merging = start(scene)
-    groups = merging.run(segments, everything(segments), motions)
+    groups = merging.run(window(segments), motions)
     assert len(groups) == motions
     assert len(merging.merges) == len(np.unique(segments)) - motions
     assert sorted(np.concatenate([group.members for group in groups])) == list(range(len(segments)))
@@ -66,7 +68,7 @@ def test_a_known_number_of_motions_is_kept(motions: int) -> None:
 
 def test_fewer_segments_than_motions_stay_as_they_are() -> None:
     scene = make_scene(movers=(LEFT_CAR,))
-    assert len(start(scene).run(scene.truth, everything(scene.truth), 4)) == 2
+    assert len(start(scene).run(window(scene.truth), 4)) == 2
 
 
 def test_merging_starts_with_the_likeliest_and_stops_at_one_half() -> None:
@@ -75,14 +77,15 @@ def test_merging_starts_with_the_likeliest_and_stops_at_one_half() -> None:
     x = (place[:, None] + [-5.0, 0.0, 5.0]).ravel()
     xy = np.stack([x, np.tile([0.0, 1.0, 0.0], 4)], axis=1)[None] + np.zeros((4, 1, 1))
     near = rule(gap_always=2.0, constant=-2 * np.log(60))
-    cues = Cues(Tracks.from_array(xy), xy[0], np.ones(12), 1.0, 10)
+    cues = Cues(Tracks.from_array(xy), xy[0], np.ones(12), np.zeros(12), 1.0, 10)
     merging = Agglomeration(cues, near)
-    groups = merging.run(np.repeat(np.arange(4), 3), np.ones(12, dtype=bool), None)
+    groups = merging.run(window(np.repeat(np.arange(4), 3)))
+    assert len(Agglomeration(cues, near).run(window(np.repeat(np.arange(4), 3)), stop=0.05)) == 4
     assert [merge[:2] for merge in merging.merges] == [(1, 2)]
     assert merging.merges[0][2] == pytest.approx(1 / (1 + (60 / 20) ** 2), rel=1e-6)
     assert [group.members.tolist() for group in groups] == [[0, 1, 2], [9, 10, 11], [3, 4, 5, 6, 7, 8]]
     merging = Agglomeration(cues, near)
-    merging.run(np.repeat(np.arange(4), 3), np.ones(12, dtype=bool), 1)
+    merging.run(window(np.repeat(np.arange(4), 3)), 1)
     # The pair becomes number 4; then what is nearest to it, and the result is number 5.
     assert [merge[:2] for merge in merging.merges] == [(1, 2), (0, 4), (3, 5)]
 
@@ -90,14 +93,14 @@ def test_merging_starts_with_the_likeliest_and_stops_at_one_half() -> None:
 def test_points_that_no_model_explains_are_carried_along() -> None:
     scene = make_scene(movers=(LEFT_CAR,))
     segments = cut(scene)
-    explained = everything(segments)
+    explained = np.ones(len(segments), dtype=bool)
     explained[::4] = False
     xy = scene.tracks.xy.copy()
     xy[:, ::4] += np.random.default_rng(0).normal(0, 20, xy[:, ::4].shape)
     spoilt = Tracks.from_array(xy, size=SIZE)
-    evidence = start(scene).cues.evidence
-    merging = Agglomeration(Cues(spoilt, scene.tracks.xy[0], evidence, 1.0, 10), learnt())
-    groups = merging.run(segments, explained, None)
+    seen = start(scene).cues
+    cues = Cues(spoilt, scene.tracks.xy[0], seen.evidence, seen.nearness, 1.0, 10)
+    groups = Agglomeration(cues, learnt().core).run(window(segments, explained))
     assert len(groups) == 2
     assert sorted(np.concatenate([group.members for group in groups])) == list(range(len(segments)))
     assert all(explained[group.reliable].all() for group in groups)
@@ -106,14 +109,16 @@ def test_points_that_no_model_explains_are_carried_along() -> None:
 def test_parts_are_measured_by_what_is_explained_unless_that_is_a_single_point() -> None:
     segments = np.array([0, 0, 0, 1, 1, 1])
     explained = np.array([True, False, True, False, True, False])
-    found = [(members.tolist(), reliable.tolist()) for members, reliable in parts_of(segments, explained)]
+    found = [
+        (members.tolist(), reliable.tolist()) for members, reliable in window(segments, explained).parts()
+    ]
     assert found == [([0, 1, 2], [0, 2]), ([3, 4, 5], [3, 4, 5])]
-    assert parts_of(np.empty(0, np.int64), np.empty(0, bool)) == []
+    assert window(np.empty(0, np.int64)).parts() == []
 
 
 def test_apart_is_the_rule_on_the_measured_pair() -> None:
     scene = make_scene(movers=(LEFT_CAR,))
     merging = start(scene, rule(smaller_always=1.0))
-    groups = merging.cues.groups(parts_of(scene.truth, everything(scene.truth)))
+    groups = merging.cues.groups(window(scene.truth).parts())
     smaller = np.exp(merging.cues.between([(groups[0], groups[1])])[0, 2 + CUES.index("smaller")])
     assert merging.apart(groups[0], groups[1]) == pytest.approx(smaller / (1 + smaller))

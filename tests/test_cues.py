@@ -38,7 +38,7 @@ def measure(
 ) -> tuple[Cues, list[Group]]:
     """The pieces of both bodies, each of one segment."""
     evidence = np.ones(tracks.points) if evidence is None else evidence
-    cues = Cues(tracks, tracks.xy[0], evidence, unit, 10)
+    cues = Cues(tracks, tracks.xy[0], evidence, np.zeros(tracks.points), unit, 10)
     pieces = [np.arange(k, k + PIECE) for k in range(0, tracks.points, PIECE)]
     return cues, cues.groups([(piece, piece) for piece in pieces])
 
@@ -92,7 +92,7 @@ def test_evidence_is_the_median_of_the_reliable_points() -> None:
     tracks = bodies()
     evidence = np.full(tracks.points, 100.0)
     evidence[:10], evidence[40:60] = 3.0, 0.5
-    cues = Cues(tracks, tracks.xy[0], evidence, 1.0, 10)
+    cues = Cues(tracks, tracks.xy[0], evidence, np.zeros(tracks.points), 1.0, 10)
     found = cues.groups([(np.arange(40), np.arange(10)), (np.arange(40, 60), np.arange(40, 60))])
     assert [group.evidence for group in found] == [3.0, 0.5]
     for pair in ((found[0], found[1]), (found[1], found[0])):
@@ -102,7 +102,7 @@ def test_evidence_is_the_median_of_the_reliable_points() -> None:
 
 def test_the_order_of_two_segments_does_not_matter() -> None:
     tracks = bodies()
-    cues = Cues(tracks, tracks.xy[0], np.ones(tracks.points), 1.0, 10)
+    cues = Cues(tracks, tracks.xy[0], np.ones(tracks.points), np.zeros(tracks.points), 1.0, 10)
     parts = [np.arange(25), np.arange(25, 40), np.arange(40, 65), np.arange(65, 80)]
     groups = cues.groups([(part, part) for part in parts])
     pairs = [(a, b) for k, a in enumerate(groups) for b in groups[k + 1 :]]
@@ -135,7 +135,7 @@ def test_merged_groups_are_measured_as_one() -> None:
 
 def test_large_segments_are_measured_by_some_of_their_points() -> None:
     tracks = Tracks.from_array(np.random.default_rng(0).uniform(0, 99, (5, 300, 2)))
-    cues = Cues(tracks, tracks.xy[0], np.ones(300), 1.0, 10)
+    cues = Cues(tracks, tracks.xy[0], np.ones(300), np.zeros(tracks.points), 1.0, 10)
     (group,) = cues.groups([(np.arange(300), np.arange(100, 300))])
     assert 50 <= len(group.sample) <= 60
     assert np.isin(group.sample, group.reliable).all()
@@ -148,7 +148,7 @@ def test_segments_never_seen_together_take_the_usual_shear() -> None:
     xy[8:, 2 * PIECE :] = np.nan
     tracks = Tracks.from_array(xy)
     anchor = np.nanmean(xy, axis=0)
-    cues = Cues(tracks, anchor, np.ones(tracks.points), 1.0, 10)
+    cues = Cues(tracks, anchor, np.ones(tracks.points), np.zeros(tracks.points), 1.0, 10)
     groups = cues.groups([(part, part) for part in (np.arange(PIECE), np.arange(2 * PIECE, 4 * PIECE))])
     insides = [group.inside for group in groups]
     assert cues.typical_inside == pytest.approx(np.median(insides))
@@ -157,9 +157,40 @@ def test_segments_never_seen_together_take_the_usual_shear() -> None:
 
 def test_single_points_have_finite_cues() -> None:
     tracks = bodies()
-    cues = Cues(tracks, tracks.xy[0], np.zeros(tracks.points), 1.0, 10)
+    cues = Cues(tracks, tracks.xy[0], np.zeros(tracks.points), np.zeros(tracks.points), 1.0, 10)
     parts = [np.array([0]), np.array([50]), np.arange(10, 30)]
     groups = cues.groups([(part, part) for part in parts])
     assert np.isnan(groups[0].inside)
     pairs = [(groups[0], groups[1]), (groups[1], groups[2])]
     assert np.isfinite(cues.between(pairs)).all()
+
+
+def test_depth_is_what_parts_two_groups_over_what_spreads_them() -> None:
+    tracks = bodies()
+    nearness = np.concatenate([np.linspace(0.1, 0.2, 40), np.linspace(0.5, 0.7, 40)])
+    cues = Cues(tracks, tracks.xy[0], np.zeros(80), nearness, 1.0, 10)
+    (one, other) = cues.groups([(part, part) for part in (np.arange(40), np.arange(40, 80))])
+    low, middle, high = other.depth
+    assert (low, middle, high) == pytest.approx((0.52, 0.6, 0.68))
+    spread = 0.8 * 0.1 + 0.8 * 0.2 + 0.02 * 0.6 + 0.001
+    assert cue("depth", cues, one, other) == pytest.approx(0.45 / spread + 0.1)
+    assert cue("depth", cues, one, one) == pytest.approx(0.1)
+
+
+def test_another_world_changes_evidence_and_depth_alone() -> None:
+    """What was measured before is kept, and is what would be measured again."""
+    tracks = bodies()
+    rng = np.random.default_rng(3)
+    cues, pieces = measure(tracks)
+    before = cues.between([(pieces[0], pieces[2])])
+    evidence, nearness = rng.uniform(0, 3, 80), rng.uniform(0, 1, 80)
+    moved = cues.in_world(evidence, nearness)
+    fresh = Cues(tracks, tracks.xy[0], evidence, nearness, 1.0, 10)
+    parts = [(group.members, group.reliable) for group in pieces]
+    for one in (moved, fresh):
+        pieces = one.groups(parts)
+        after = one.between([(pieces[0], pieces[2])])
+        unchanged = [2 + k for k, name in enumerate(CUES) if name != "depth"]
+        assert after[0, unchanged] == pytest.approx(before[0, unchanged])
+        assert not np.isclose(after[0, [0, 1, 2 + CUES.index("depth")]], before[0, [0, 1, -1]]).any()
+    assert moved.between([(pieces[0], pieces[3])]) == pytest.approx(fresh.between([(pieces[0], pieces[3])]))

@@ -21,7 +21,6 @@ from ifsvideo.benchmark.learning_oracle import FIRST_PAIRS, PAIRS_PER_MERGE, Pai
 from ifsvideo.benchmark.metrics import MovesCount
 from ifsvideo.config import Config
 from ifsvideo.errors import InputError
-from ifsvideo.segmentation.agglomeration import parts_of
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import CUES
 from ifsvideo.segmentation.segmenter import IFSSegmenter
@@ -60,9 +59,9 @@ KNOWN = np.where(np.isin(feature_names(), ["constant", "rigid.always", "gap.if_b
 
 
 def test_pairs_of_one_motion_weigh_as_much_as_those_of_two() -> None:
-    pairs = Pairs(np.zeros((3, 9)), np.array([True, False, False]), np.array([5.0, 1.0, 10.0]))
+    pairs = Pairs(np.zeros((3, 10)), np.array([True, False, False]), np.array([5.0, 1.0, 10.0]))
     assert pairs.weights() == pytest.approx([0.5, 0.5 / (1 + 10**0.7), 0.5 * 10**0.7 / (1 + 10**0.7)])
-    alone = Pairs(np.zeros((2, 9)), np.array([True, True]), np.array([4.0, 4.0]))
+    alone = Pairs(np.zeros((2, 10)), np.array([True, True]), np.array([4.0, 4.0]))
     assert alone.weights() == pytest.approx([0.25, 0.25])
 
 
@@ -84,7 +83,7 @@ def test_sequences_count_by_their_importance() -> None:
 
 @pytest.mark.parametrize("apart", [[], [True, True], [False]])
 def test_both_kinds_of_pairs_are_needed(apart: list[bool]) -> None:
-    pairs = Pairs(np.zeros((len(apart), 9)), np.array(apart, dtype=bool), np.ones(len(apart)))
+    pairs = Pairs(np.zeros((len(apart), 10)), np.array(apart, dtype=bool), np.ones(len(apart)))
     with pytest.raises(InputError, match="too few sequences"):
         learning.fit([pairs], [1.0])
 
@@ -94,16 +93,16 @@ def test_a_staged_sequence_is_what_the_segmenter_makes_of_it() -> None:
     found = staged()
     sequence = found.task.example.sequence
     expected = IFSSegmenter(found.task.config, found.task.seed).segment(sequence.tracks)
-    (score,) = learning.judge(learning.Judged(found, (learnt(),)))
+    (score,) = learning.judge(learning.Judged(found, (learnt().final,)))
     assert score.error == metrics.error(expected.labels, sequence.truth)
     assert score.estimated == len(np.unique(expected.labels))
-    assert found.cues().unit == 1.0
+    assert found.cues.unit == 1.0
 
 
 def test_the_oracle_measures_segments_and_what_they_grow_to() -> None:
     found = staged()
     pairs = oracle_pairs(found)
-    segments = len(np.unique(found.segments))
+    segments = len(np.unique(found.window.segments))
     first = min(FIRST_PAIRS, segments * (segments - 1) // 2)
     assert first < len(pairs.apart) <= first + PAIRS_PER_MERGE * segments
     assert pairs.apart.any()
@@ -120,7 +119,7 @@ def test_segments_of_mixed_or_unknown_motion_are_left_out() -> None:
     whole = staged()
     truth = whole.task.example.sequence.truth
     mixed = np.zeros_like(truth)
-    for _, reliable in parts_of(whole.segments, whole.explained):
+    for _, reliable in whole.window.parts():
         mixed[reliable] = 1 + np.arange(len(reliable)) % 2  # one of three is not 80 %
     assert not len(oracle_pairs(staged(truth=mixed)).apart)
     unknown = np.where(truth == 1, 1, 0)
@@ -190,7 +189,7 @@ def test_no_sequence_is_judged_by_what_was_learnt_from_its_group(monkeypatch: py
 
     def fit(pairs: Sequence[Pairs], importance: Sequence[float]) -> Similarity:
         assert set(importance) == {SOURCE_WEIGHTS["samples"]}
-        rule = Similarity(learnt().weights.copy())
+        rule = Similarity(learnt().final.weights.copy())
         used[id(rule)] = [next(k for k, own in enumerate(prepared) if own is one) for one in pairs]
         return rule
 
@@ -239,7 +238,8 @@ def test_the_command_learns_tells_and_writes(
     text = (tmp_path / "w.toml").read_text()
     assert report["command"] == "python -m ifsvideo.benchmark learn --simulated 4 --runs 1 --seed 3"
     assert report["command"] in text
-    weights = tomllib.loads(text)
+    assert tomllib.loads(text).keys() == {"core", "final"}
+    weights = tomllib.loads(text)["final"]
     flat = weights["first"] | {f"{cue}.{when}": w for cue in CUES for when, w in weights[cue].items()}
     assert [flat[name] for name in feature_names()] == [report["weights"][name] for name in feature_names()]
 

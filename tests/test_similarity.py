@@ -50,25 +50,28 @@ def test_probability_is_logistic_in_the_weighed_features(name: str) -> None:
 
 
 def test_the_file_holds_every_weight_and_no_other() -> None:
-    assert FILE.keys() == {"first", *CUES}
-    assert list(FILE["first"]) == feature_names()[:6]
-    assert all(tuple(FILE[cue]) == WHEN for cue in CUES)
+    assert FILE.keys() == {"core", "final"}
+    for rule in FILE.values():
+        assert rule.keys() == {"first", *CUES}
+        assert list(rule["first"]) == feature_names()[:6]
+        assert all(tuple(rule[cue]) == WHEN for cue in CUES)
 
 
-def test_weights_of_the_file_are_finite_and_in_their_place() -> None:
-    weights = dict(zip(feature_names(), learnt().weights, strict=True))
+@pytest.mark.parametrize("part", ["core", "final"])
+def test_weights_of_the_file_are_finite_and_in_their_place(part: str) -> None:
+    weights = dict(zip(feature_names(), getattr(learnt(), part).weights, strict=True))
     assert np.isfinite(list(weights.values())).all()
-    for name, value in FILE["first"].items():
+    for name, value in FILE[part]["first"].items():
         assert weights[name] == value
     for cue in CUES:
         for when in WHEN:
-            assert weights[f"{cue}.{when}"] == FILE[cue][when]
+            assert weights[f"{cue}.{when}"] == FILE[part][cue][when]
 
 
 def measured(evidence: tuple[float, float], **ratios: float) -> np.ndarray:
     """One pair, plain numbers in place of logarithms."""
     usual = {"rigid": 1.0, "affine": 1.0, "shear": 0.1, "shear_ratio": 1.0, "gap": 20.0}
-    values = usual | {"larger": 50.0, "smaller": 30.0} | ratios
+    values = usual | {"larger": 50.0, "smaller": 30.0, "depth": 0.3} | ratios
     return np.log([[*evidence, *(values[cue] for cue in CUES)]])
 
 
@@ -76,5 +79,6 @@ def test_the_rule_knows_clear_cases() -> None:
     """Static neighbours that predict each other are one motion; what moves unpredicted is another."""
     alike = measured((0.3, 0.2))
     apart = measured((30.0, 0.2), rigid=40.0, affine=40.0, shear=2.0, shear_ratio=20.0)
-    assert learnt().apart(alike) < 0.1
-    assert learnt().apart(apart) > 0.9
+    for rule in (learnt().core, learnt().final):
+        assert rule.apart(alike) < 0.1
+        assert rule.apart(apart) > 0.9

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.world import fit_world, static_evidence
+from ifsvideo.segmentation.world import World, fit_world
 from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, Mover, Scene, make_scene
+
+
+def static_evidence(
+    tracks: Tracks, size: tuple[int, int], threshold: float, rng: np.random.Generator
+) -> tuple[np.ndarray, World | None]:
+    world = fit_world(tracks, size, rng)
+    return (np.zeros(tracks.points) if world is None else world.evidence(threshold)), world
+
 
 FORWARD = Camera.path(step=(0, 0, 0.3))
 
@@ -84,7 +92,7 @@ def test_depths_are_found_up_to_scale() -> None:
     scene = make_scene(FORWARD, noise=0.05)
     world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
     assert world is not None
-    middle = world.frames[world.reference]
+    middle = world.frames[world.bundle.reference]
     depth = (scene.world[middle] - scene.camera.centre[middle]) @ scene.camera.R[middle][2]
     # The camera does not turn, so that a point moves by its depth alone.
     sure = np.linalg.norm(scene.tracks.xy[-1] - scene.tracks.xy[0], axis=1) > 20
@@ -153,3 +161,33 @@ def test_points_that_all_share_a_place(value: float) -> None:
 def test_same_seed_same_evidence() -> None:
     scene = make_scene(FORWARD, (LEFT_CAR,))
     assert np.array_equal(evidence_of(scene), evidence_of(scene))
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_world_of_static_points_alone_tells_a_mover_that_was_explained_before(seed: int) -> None:
+    """Aside of a camera that goes aside, a steady car is like a thing at another depth."""
+    scene = make_scene(Camera.path(step=(0.2, 0, 0)), (LEFT_CAR, RIGHT_CAR), seed=seed)
+    few = np.flatnonzero(scene.truth == 0)[:40]
+    shown = np.sort(np.concatenate([few, np.flatnonzero(scene.truth > 0)]))
+    tracks, truth = scene.tracks.select(shown), scene.truth[shown]
+    world = fit_world(tracks, SIZE, np.random.default_rng(0))
+    assert world is not None
+    static = np.flatnonzero(truth == 0)
+    before, after = world.evidence(5.0), world.fitted_to(static).evidence(5.0)
+    assert np.median(before[truth == 2]) < 1 < 1.3 < np.median(after[truth == 2])
+    assert np.median(after[truth == 1]) > 5
+    assert np.median(after[static]) < 0.3
+    assert world.fitted_to(static[:3]) is world  # three points make no world
+
+
+def test_nearness_is_the_cameras_way_over_the_distance() -> None:
+    scene = make_scene(FORWARD, depth=(8.0, 80.0))
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    assert world is not None
+    assert (world.nearness >= 0).all()
+    again = world.fitted_to(np.arange(scene.tracks.points))
+    assert np.corrcoef(world.nearness, again.nearness)[0, 1] > 0.99
+    turning = fit_world(make_scene(CAMERAS["standing"]).tracks, SIZE, np.random.default_rng(0))
+    assert turning is not None
+    assert not turning.nearness.any()
+    assert not turning.has_moved

@@ -93,9 +93,11 @@ from ifsvideo.benchmark.side_by_side import draw_all
 from ifsvideo.config import Config
 from ifsvideo.errors import IfsVideoError, UsageError
 from ifsvideo.output.atomic import check_writable
+from ifsvideo.segmentation.similarity import Rules, learnt
 
 _LEARN = """\
-Learn the weights of stage 5, which merges segments by a logistic rule, and measure what they reach.
+Learn the weights of stage 5 (its second pass), which merges segments by a logistic rule, and measure what
+they reach.
 
 Every sequence is taken to segments (stages 1 to 4). Segments of which at least 80 % of the labelled points
 are of one motion are merged as an oracle would, and pairs of groups on the way are what is learnt from. Then
@@ -331,7 +333,7 @@ def _learn(options: argparse.Namespace) -> None:
     command = _command_of(options)
     print(learning.table(scores))
     if options.write:
-        write_text(options.write, learning.as_toml(rule, command))
+        write_text(options.write, learning.as_toml(Rules(learnt().core, rule), command))
         print(f"wrote {options.write}")
     if options.json:
         write_report(options.json, {"command": command, **scores})

@@ -25,7 +25,7 @@ from ifsvideo.segmentation.agglomeration import Agglomeration
 from ifsvideo.segmentation.background import merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import CUES
-from ifsvideo.segmentation.similarity import WHEN, Similarity, feature_names, features
+from ifsvideo.segmentation.similarity import WHEN, Rules, Similarity, feature_names, features
 from ifsvideo.types import UNDECIDED
 
 Array = NDArray[np.float64]
@@ -101,13 +101,10 @@ def judge(judged: Judged) -> list[Score]:
     """Score of each rule: the whole of stage 5 with it, on the segments that are there."""
     staged, scores = judged.staged, []
     truth = staged.task.example.sequence.truth
-    cues = staged.cues()
     for rule in judged.rules:
         labels = np.full(len(truth), UNDECIDED, dtype=np.int64)
-        merging = Agglomeration(cues, rule)
-        labels[staged.usable], _ = merge_and_label(
-            merging, staged.segments, staged.explained, staged.size, staged.task.config
-        )
+        merging = Agglomeration(staged.cues, rule)
+        labels[staged.usable], _ = merge_and_label(merging, staged.window, staged.task.config)
         scores.append(
             Score(
                 metrics.error(labels, truth), metrics.group_count(labels, truth), metrics.moves(labels, truth)
@@ -127,6 +124,8 @@ def learn(
     examples: Sequence[Example], runs: int = 1, seed: int = 0, jobs: int = 1, quiet: bool = False
 ) -> tuple[Similarity, Report]:
     """Learn the rule from all examples, and measure it by cross-validation over their groups.
+
+    It is that of the second pass of stage 5; in the first the package's own is followed.
 
     Parameters
     ----------
@@ -168,9 +167,14 @@ def learn(
         "runs": runs,
         "seed": seed,
         "sources": [_summary(source, rows) for source in sources_of(examples)],
-        "weights": dict(zip(feature_names(), rule.weights.tolist(), strict=True)),
+        "weights": _named(rule),
         "sequences": rows,
     }
+
+
+def _named(rule: Similarity) -> dict[str, float]:
+    """Weights by their names."""
+    return dict(zip(feature_names(), rule.weights.tolist(), strict=True))
 
 
 _RULES = ("held_out", "in_sample")
@@ -223,21 +227,25 @@ def table(report: Report) -> str:
     return align(header, rows)
 
 
-def as_toml(rule: Similarity, command: str) -> str:
+def as_toml(rules: Rules, command: str) -> str:
     """The file `similarity.toml`, which a comment says is made by ``command``."""
-    weight = dict(zip(feature_names(), rule.weights.tolist(), strict=True))
-    first = [name for name in feature_names() if "." not in name]
     lines = [
-        "# How stage 5 weighs what it measures of two segments; more speaks for two motions. Learnt by",
+        "# How stage 5 weighs what it measures of two segments; more speaks for two motions. first: the",
+        "# constant, the logarithms of the larger and the smaller evidence of motion, the probabilities that",
+        "# one of the two moves and that both do, and their product. Every other section is a cue",
+        "# (ifsvideo/segmentation/cues.py): its weight always, and what is added the surer one of the two",
+        "# moves, or both do.",
+        "#",
+        "# [core.*] is the rule of the first pass. It was learnt before models had a label cost and before",
+        "# there was a second pass, from more and smaller segments, which serves it better than to be learnt",
+        "# anew (ifsvideo/benchmark/TRIED.md). [final.*] is that of the second pass, learnt by",
         f"#   {command}",
-        "# [first]: the constant, the logarithms of the larger and the smaller evidence of motion, the",
-        "# probabilities that one of the two moves and that both do, and their product. Every other section",
-        "# is a cue (ifsvideo/segmentation/cues.py): its weight always, and what is added the surer one of",
-        "# the two moves, or both do.",
-        "",
-        "[first]",
-        *(f"{name} = {weight[name]:.{DECIMALS}f}" for name in first),
     ]
-    for cue in CUES:
-        lines += ["", f"[{cue}]", *(f"{when} = {weight[f'{cue}.{when}']:.{DECIMALS}f}" for when in WHEN)]
+    for part, rule in (("core", rules.core), ("final", rules.final)):
+        weight = _named(rule)
+        lines += ["", f"[{part}.first]"]
+        lines += [f"{name} = {weight[name]:.{DECIMALS}f}" for name in weight if "." not in name]
+        for cue in CUES:
+            lines += ["", f"[{part}.{cue}]"]
+            lines += [f"{when} = {weight[f'{cue}.{when}']:.{DECIMALS}f}" for when in WHEN]
     return "\n".join(lines) + "\n"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.benchmark.learning_data import Example
-from ifsvideo.segmentation.agglomeration import parts_of
+from ifsvideo.segmentation.agglomeration import Window
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import Cues, Group
 from ifsvideo.segmentation.segmenter import IFSSegmenter
@@ -70,53 +70,39 @@ class Task:
 
 @dataclass(frozen=True)
 class Staged:
-    """What stages 1 to 4 made of a sequence: all that stage 5 starts from.
+    """What a sequence is when the second pass of stage 5 starts.
 
     Attributes
     ----------
     usable : (U,) int
         Points that were segmented; all arrays below have one entry for each of them.
-    segments : (U,) int64
-    explained : (U,) bool
-    anchor : (U, 2) float, pixels
-    evidence : (U,) float
-    size : (width, height), pixels
+    window : Window
+    cues : Cues
+        What is measured in the world of the static core.
     """
 
     task: Task
     usable: NDArray[np.int64]
-    segments: NDArray[np.int64]
-    explained: NDArray[np.bool_]
-    anchor: Array
-    evidence: Array
-    size: tuple[int, int]
+    window: Window
+    cues: Cues
 
     @classmethod
     def of(cls, task: Task) -> Staged:
-        """Run stages 1 to 4."""
+        """Run stages 1 to 4, and the first pass of stage 5 with the rule that the package has for it."""
         found = IFSSegmenter(task.config, task.seed).segment(task.example.sequence.tracks)
         kept = found.details
-        explained = kept["fit"] < task.config.outlier_cost
-        segments = found.segments[kept["usable"]]
-        return cls(task, kept["usable"], segments, explained, kept["anchor"], kept["evidence"], kept["size"])
+        return cls(task, kept["usable"], kept["window"], kept["cues"])
 
     @property
     def truth(self) -> NDArray[np.int64]:
         """True group (U,) of the points, 0 where it is not known."""
         return self.task.example.sequence.truth[self.usable]
 
-    def cues(self) -> Cues:
-        """What stage 5 measures of it."""
-        tracks = self.task.example.sequence.tracks.select(self.usable)
-        unit = float(np.hypot(*self.size)) / 800
-        return Cues(tracks, self.anchor, self.evidence, unit, self.task.config.pairs)
-
 
 def oracle_pairs(staged: Staged) -> Pairs:
     """Merge what is truly one motion, near groups first with some randomness; measure pairs on the way."""
-    rng = np.random.default_rng(staged.task.seed)
-    cues = staged.cues()
-    parts = cues.groups(parts_of(staged.segments, staged.explained))
+    rng, cues = np.random.default_rng(staged.task.seed), staged.cues
+    parts = cues.groups(staged.window.parts())
     known = {number: (part, _motion(staged.truth[part.reliable])) for number, part in enumerate(parts)}
     known = {number: entry for number, entry in known.items() if entry[1]}
     pairs = list(combinations(known, 2))
@@ -155,6 +141,6 @@ def _distance(cues: Cues, a: Group, b: Group) -> float:
 
 
 def prepare(task: Task) -> tuple[Staged, Pairs]:
-    """Stages 1 to 4 of a sequence, and an oracle's pairs of it."""
+    """A sequence up to the second pass of stage 5, and an oracle's pairs of it there."""
     staged = Staged.of(task)
     return staged, oracle_pairs(staged)

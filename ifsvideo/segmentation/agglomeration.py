@@ -16,6 +16,34 @@ from ifsvideo.segmentation.cues import Cues, Group, Members
 from ifsvideo.segmentation.similarity import Similarity
 
 
+@dataclass(frozen=True)
+class Window:
+    """What stage 5 starts from.
+
+    Attributes
+    ----------
+    segments : (P,) int
+        Segment of each point, from 0.
+    explained : (P,) bool
+        Whether its segment's model explains the point; the others are carried along, not measured.
+    size : (width, height) of the picture, pixels
+    """
+
+    segments: NDArray[np.int64]
+    explained: NDArray[np.bool_]
+    size: tuple[int, int]
+
+    def parts(self) -> list[tuple[Members, Members]]:
+        """Points of each segment, and those of them that are measured: the explained ones where there are
+        two."""
+        parts = []
+        for s in range(int(self.segments.max(initial=-1)) + 1):
+            members = np.flatnonzero(self.segments == s)
+            reliable = members[self.explained[members]]
+            parts.append((members, reliable if len(reliable) >= 2 else members))
+        return parts
+
+
 @dataclass
 class Agglomeration:
     """Merges the segments of one window.
@@ -31,24 +59,15 @@ class Agglomeration:
     similarity: Similarity
     merges: list[tuple[int, int, float]] = field(default_factory=list)
 
-    def run(
-        self, segments: NDArray[np.int64], explained: NDArray[np.bool_], motions: int | None
-    ) -> list[Group]:
-        """Merge segments until the best pair is more likely two motions than one, or ``motions`` are left.
-
-        Parameters
-        ----------
-        segments : (P,) int
-            Segment of each point, from 0.
-        explained : (P,) bool
-            Whether its segment's model explains the point; the others are carried along, not measured.
-        """
-        groups = dict(enumerate(self.cues.groups(parts_of(segments, explained))))
+    def run(self, window: Window, motions: int | None = None, stop: float = 0.5) -> list[Group]:
+        """Merge segments until the best pair is two motions with probability ``stop``, or ``motions`` are
+        left."""
+        groups = dict(enumerate(self.cues.groups(window.parts())))
         apart = self._apart(groups, [(i, j) for i in groups for j in groups if i < j])
         following = len(groups)
         while apart:
             (i, j), cost = min(apart.items(), key=lambda item: (item[1], item[0]))
-            if cost > 0.5 if motions is None else len(groups) <= motions:
+            if cost > stop if motions is None else len(groups) <= motions:
                 break
             self.merges.append((i, j, cost))
             merged = self.cues.merge(groups.pop(i), groups.pop(j))
@@ -66,13 +85,3 @@ class Agglomeration:
         """Probability of each pair that it is two motions."""
         measured = self.cues.between([(groups[i], groups[j]) for i, j in pairs])
         return dict(zip(pairs, self.similarity.apart(measured).tolist(), strict=True))
-
-
-def parts_of(segments: NDArray[np.int64], explained: NDArray[np.bool_]) -> list[tuple[Members, Members]]:
-    """Points of each segment, and those of them that are measured: the explained ones where there are two."""
-    parts = []
-    for s in range(int(segments.max(initial=-1)) + 1):
-        members = np.flatnonzero(segments == s)
-        reliable = members[explained[members]]
-        parts.append((members, reliable if len(reliable) >= 2 else members))
-    return parts

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.special import expit
 
-from ifsvideo.segmentation.agglomeration import Agglomeration
+from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import Group, Members
 from ifsvideo.types import BACKGROUND
@@ -20,9 +20,7 @@ _FEW = 10
 
 def merge_and_label(
     merging: Agglomeration,
-    segments: NDArray[np.int64],
-    explained: NDArray[np.bool_],
-    size: tuple[int, int],
+    window: Window,
     config: SegmenterConfig,
     motions: int | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -32,21 +30,19 @@ def merge_and_label(
     ----------
     merging : Agglomeration
         With the measurements and the rule; keeps what it merged.
-    segments, explained : (P,)
-        As of `Agglomeration.run`.
-    size : (width, height) of the picture, pixels
+    window : Window
 
     Returns
     -------
     labels : (P,) int64
     confidence : (P,) float, 0 to 1
     """
-    groups = merging.run(segments, explained, motions)
+    segments, size = window.segments, window.size
+    groups = merging.run(window, motions)
     cues = merging.cues
     labels = np.full(len(segments), BACKGROUND, dtype=np.int64)
     confidence = np.ones(len(segments))
-    claims = [_spread(cues.anchor[g.members], size) / (1 + g.evidence**2) for g in groups]
-    still = groups.pop(int(np.argmax(claims)))
+    still = groups.pop(static_group(groups, cues.anchor, size))
     things: list[Members] = []
     for group in groups:
         parts = [group]
@@ -67,6 +63,12 @@ def merge_and_label(
     for number, members in enumerate(sorted(things, key=lambda m: (-len(m), int(m[0]))), 1):
         labels[members] = number
     return labels, confidence
+
+
+def static_group(groups: list[Group], anchor: NDArray[np.float64], size: tuple[int, int]) -> int:
+    """Which group is the static world: it fits, and is spread over the picture."""
+    claims = [_spread(anchor[g.members], size) / (1 + g.evidence**2) for g in groups]
+    return int(np.argmax(claims))
 
 
 def _pieces(members: Members, anchor: NDArray[np.float64], gap: float) -> list[Members]:

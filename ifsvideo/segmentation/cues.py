@@ -5,7 +5,8 @@ All are logarithms, so that a linear rule weighs ratios: twice the shear, half t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from ifsvideo.types import Tracks
 Array = NDArray[np.float64]
 Members = NDArray[np.int64]
 
-CUES = ("rigid", "affine", "shear", "shear_ratio", "gap", "larger", "smaller")
+CUES = ("rigid", "affine", "shear", "shear_ratio", "gap", "larger", "smaller", "depth")
 """Names of what is measured between two segments, in the order of the columns of `Cues.between`:
 
 rigid, affine : how far the smaller one's points are from the larger one's rank-3 and rank-2 subspace, over
@@ -26,6 +27,9 @@ shear : in-frame shear and stretch between nearest points, a frame (thesis Algor
 shear_ratio : the same over that inside the two (the thesis's predicate)
 gap : least distance between their points
 larger, smaller : their numbers of points
+depth : how far apart they are in nearness to the camera, over the spread of both: where a camera path is
+    found that makes one static world of two movers, each lies flat at a depth of its own, while a street goes
+    on from one segment to the next
 """
 
 _MOST = 60
@@ -36,6 +40,10 @@ _LEAST_FOR_NOISE = 6
 """Points that a segment needs to tell how noisy tracks are; fewer fit any subspace."""
 _LEAST_NOISE = 0.05
 """Pixels; no tracker is better."""
+_LEAST_SPREAD = 0.02
+"""Least spread of nearness, over nearness: a window fixes depths no better."""
+_SAME_DEPTH = 0.1
+"""Added to ``depth``, whose logarithm would weigh nothing against next to nothing otherwise."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,7 @@ class Group:
     sample : (n'',) int, those of them that are measured
     evidence : float
         Median distance of the reliable points from a static point's way; above 1 speaks for motion.
+    depth : (3,) float, nearness below which a tenth, half and nine tenths of the reliable points lie
     inside : float, shear inside it, NaN where it has no edge
     rigid, affine : (P,) float, distance of every point from its rank-3 and rank-2 subspace, pixels
     """
@@ -57,6 +66,7 @@ class Group:
     reliable: Members
     sample: Members
     evidence: float
+    depth: Array
     inside: float
     rigid: Array
     affine: Array
@@ -71,33 +81,63 @@ class Cues:
     anchor : (P, 2) float, places in the base frame, pixels
     evidence : (P,) float
         Distance from a static point's way in units of what is usual in this window.
+    nearness : (P,) float
+        How near the camera a point is if it is static (`ifsvideo.segmentation.world.World.nearness`).
     unit : float, pixels of a picture per pixel of a 640x480 one
     pairs : int
         Pairs of points between which shear is measured.
     """
 
-    def __init__(self, tracks: Tracks, anchor: Array, evidence: Array, unit: float, pairs: int) -> None:
-        self.tracks, self.anchor, self.evidence, self.unit, self.pairs = tracks, anchor, evidence, unit, pairs
+    def __init__(
+        self, tracks: Tracks, anchor: Array, evidence: Array, nearness: Array, unit: float, pairs: int
+    ) -> None:
+        self.tracks, self.anchor, self.unit, self.pairs = tracks, anchor, unit, pairs
+        self.evidence, self.nearness = evidence, nearness
         self.W, self.seen = trajectory_matrix(tracks, _KEY_FRAMES)
         self.noise = self.typical_inside = 0.0
+        self._groups: dict[bytes, Group] = {}
+        self._pairs: dict[tuple[bytes, bytes], list[float]] = {}
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without what was kept only to be fast."""
+        return self.__dict__ | {"_groups": {}, "_pairs": {}}
+
+    def in_world(self, evidence: Array, nearness: Array) -> Cues:
+        """The same window in another static world: what groups were measured for by then is kept."""
+        other = copy(self)
+        other.evidence, other.nearness = evidence, nearness
+        return other
 
     def groups(self, segments: list[tuple[Members, Members]]) -> list[Group]:
         """Groups of the segments that a window starts with: (members, reliable) each."""
         found = [self.group(members, reliable) for members, reliable in segments]
         own = [np.median(g.rigid[g.sample]) for g in found if len(g.sample) >= _LEAST_FOR_NOISE]
-        self.noise = max(float(np.median(own)) if own else 0.0, _LEAST_NOISE * self.unit)
         insides = [g.inside for g in found if np.isfinite(g.inside)]
+        usual = self.noise, self.typical_inside
+        self.noise = max(float(np.median(own)) if own else 0.0, _LEAST_NOISE * self.unit)
         self.typical_inside = float(np.median(insides)) if insides else 0.0
+        if usual != (self.noise, self.typical_inside):
+            self._pairs = {}  # what was measured in units of them
         return found
 
     def group(self, members: Members, reliable: Members) -> Group:
         """Measure a group by itself."""
+        key = reliable.tobytes()
+        if key not in self._groups:
+            self._groups[key] = self._measured(members, reliable)
+        depth = np.percentile(self.nearness[reliable], [10, 50, 90])
+        return replace(
+            self._groups[key], members=members, evidence=_median(self.evidence[reliable]), depth=depth
+        )
+
+    def _measured(self, members: Members, reliable: Members) -> Group:
+        """What does not depend on the static world."""
         sample = reliable[:: 1 + (len(reliable) - 1) // _MOST]
         W, seen = self.W[:, sample], self.seen[:, sample]
         space = Subspace.fit(W, seen, 3)
         rigid, affine = (each.distance(self.W, self.seen) for each in (space, space.main(W, seen, 2)))
         inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
-        return Group(members, reliable, sample, _median(self.evidence[reliable]), inside, rigid, affine)
+        return Group(members, reliable, sample, 0.0, np.zeros(3), inside, rigid, affine)
 
     def merge(self, a: Group, b: Group) -> Group:
         """Both as one."""
@@ -107,10 +147,22 @@ class Cues:
         """Measurements (N, 2 + len(CUES)) of pairs of groups: larger and smaller evidence, then `CUES`."""
         if not pairs:
             return np.empty((0, 2 + len(CUES)))
-        edges = [shear.between_edges(self.anchor, a.sample, b.sample, self.pairs) for a, b in pairs]
-        measured = zip(pairs, self._shears(edges), self._gaps(edges), strict=True)
-        values = [self._between(a, b, float(between), float(gap)) for (a, b), between, gap in measured]
+        keys = [(a.reliable.tobytes(), b.reliable.tobytes()) for a, b in pairs]
+        self._measure({key: pair for key, pair in zip(keys, pairs, strict=True) if key not in self._pairs})
+        values = [
+            [max(a.evidence, b.evidence), min(a.evidence, b.evidence), *self._pairs[key], _depth(a, b)]
+            for key, (a, b) in zip(keys, pairs, strict=True)
+        ]
         return np.asarray(np.log(np.maximum(np.array(values), 1e-3)))
+
+    def _measure(self, pairs: dict[tuple[bytes, bytes], tuple[Group, Group]]) -> None:
+        """Keep what does not depend on the static world."""
+        if not pairs:
+            return
+        edges = [shear.between_edges(self.anchor, a.sample, b.sample, self.pairs) for a, b in pairs.values()]
+        measured = zip(pairs.items(), self._shears(edges), self._gaps(edges), strict=True)
+        for (key, (a, b)), between, gap in measured:
+            self._pairs[key] = self._between(a, b, float(between), float(gap))
 
     def _shears(self, edges: list[Members]) -> Array:
         """Shear and stretch between the groups of each pair, the typical one where no edge was ever seen."""
@@ -130,8 +182,6 @@ class Cues:
         small, large = sorted((a, b), key=lambda group: (len(group.reliable), -int(group.members[0])))
         insides = [g.inside if np.isfinite(g.inside) else self.typical_inside for g in (a, b)]
         return [
-            max(a.evidence, b.evidence),
-            min(a.evidence, b.evidence),
             _median(large.rigid[small.sample]) / self.noise,
             _median(large.affine[small.sample]) / self.noise,
             between / self.unit,
@@ -140,6 +190,13 @@ class Cues:
             len(large.reliable),
             len(small.reliable),
         ]
+
+
+def _depth(a: Group, b: Group) -> float:
+    """Difference of two groups' nearness over the spread of both."""
+    (a_far, a_mid, a_near), (b_far, b_mid, b_near) = a.depth.tolist(), b.depth.tolist()
+    spread = a_near - a_far + b_near - b_far + _LEAST_SPREAD * max(a_mid, b_mid) + 1e-3
+    return float(abs(a_mid - b_mid) / spread + _SAME_DEPTH)
 
 
 def _median(values: Array) -> float:

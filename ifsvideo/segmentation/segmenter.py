@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.lens import undistort
-from ifsvideo.segmentation.agglomeration import Agglomeration
+from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.assignment import assign, residuals
 from ifsvideo.segmentation.background import background_first, merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
@@ -20,7 +20,8 @@ from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
 from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
-from ifsvideo.segmentation.world import static_evidence
+from ifsvideo.segmentation.static_core import in_static_core
+from ifsvideo.segmentation.world import World, fit_world
 from ifsvideo.types import UNDECIDED, Segmentation, Tracks
 
 
@@ -77,7 +78,7 @@ class IFSSegmenter:
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
 
         # 1. What agrees with a static world seen by a moving camera.
-        support, evidence, details = self._split(tracks, size, unit, rng)
+        support, evidence, world = self._split(tracks, size, unit, rng)
         background = support >= 0.5
         # 2. and 3. Affine motion models in small disks, those that are needed; every point to one of them.
         models = sample_models(tracks, background, base, unit, config, rng)
@@ -94,36 +95,40 @@ class IFSSegmenter:
             # 4. Segments with clean borders, more of them than motions.
             chosen, solution = refine(tracks, models, cost, start, graph, unit, config)
             fit = residual[chosen, np.arange(tracks.points)] / unit
-            details |= {"models": models, "start": start, "solution": solution}
+            details = {"models": models, "start": start, "solution": solution}
         else:
             chosen, fit = np.zeros(tracks.points, dtype=np.int64), np.zeros(tracks.points)
+            details = {}
         segments = np.unique(chosen, return_inverse=True)[1].astype(np.int64)
-        # 5. Merge what is one motion.
+        # 5. Merge what is one motion: cautiously, then in the world of what is surely static.
         if config.merging == "shear":
             groups, scores = merge_by_shear(tracks, segments, anchor, config.pairs, config.shear_ratio, unit)
             labels = background_first(groups, support, anchor, size)
             confidence = np.ones(tracks.points)
             details["scores"] = scores
         else:
-            cues = Cues(tracks, anchor, evidence, unit, config.pairs)
-            merging = Agglomeration(cues, learnt())
-            labels, confidence = merge_and_label(
-                merging, segments, fit < config.outlier_cost, size, config, motions
-            )
-            details["merges"] = merging.merges
+            nearness = np.zeros(tracks.points) if world is None else world.nearness
+            first = Cues(tracks, anchor, evidence, nearness, unit, config.pairs)
+            window = Window(segments, fit < config.outlier_cost, size)
+            cues = in_static_core(first, window, world, learnt().core, config)
+            merging = Agglomeration(cues, learnt().final)
+            labels, confidence = merge_and_label(merging, window, config, motions)
+            evidence = cues.evidence
+            details |= {"window": window, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
         return Segmentation(labels, background, segments, confidence, details)
 
     def _split(
         self, tracks: Tracks, size: tuple[int, int], unit: float, rng: np.random.Generator
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
-        """Stage 1: support for the background 0..1, evidence of motion, details."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], World | None]:
+        """Stage 1: support for the background 0..1, evidence of motion, the world where one is fitted."""
         if self.config.split == "world":
-            evidence, world = static_evidence(tracks, size, self.config.evidence_threshold, rng)
-            return 1 / (1 + evidence**2), evidence, {"world": world}
+            world, threshold = fit_world(tracks, size, rng), self.config.evidence_threshold
+            evidence = np.zeros(tracks.points) if world is None else world.evidence(threshold)
+            return 1 / (1 + evidence**2), evidence, world
         support = epipolar_support(tracks, self.config.epipolar_error * unit, self.seed)
         # Support of one half, the thesis's own limit, is where evidence turns.
-        return support, 2 * (1 - support), {}
+        return support, 2 * (1 - support), None
 
 
 def _in_a_picture(tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:

@@ -1,7 +1,8 @@
 """How likely two segments are two motions: a logistic rule over their cues, with weights that were learnt.
 
-The weights are data, `similarity.toml`; ``python -m ifsvideo.benchmark learn`` makes them and prints what
-they reach on sequences that they were not learnt from.
+There is one rule for each of the two passes. The weights are data, `similarity.toml`;
+``python -m ifsvideo.benchmark learn`` makes those of the second, and prints what they reach on sequences that
+they were not learnt from.
 """
 
 from __future__ import annotations
@@ -60,9 +61,29 @@ class Similarity:
         return np.asarray(expit(features(measured) @ self.weights))
 
 
+@dataclass(frozen=True)
+class Rules:
+    """The rules of both passes of stage 5.
+
+    Attributes
+    ----------
+    core : Similarity
+        In the world of stage 1, which may explain parts of what moves.
+    final : Similarity
+        In the world of what is surely static (`ifsvideo.segmentation.static_core`), whose evidence is better.
+    """
+
+    core: Similarity
+    final: Similarity
+
+
 @cache
-def learnt() -> Similarity:
-    """The rule that comes with the package."""
+def learnt() -> Rules:
+    """The rules that come with the package."""
     table = tomllib.loads((files("ifsvideo.segmentation") / "similarity.toml").read_text(encoding="utf-8"))
+    return Rules(**{name: _read(table[name]) for name in ("core", "final")})
+
+
+def _read(table: dict[str, dict[str, float]]) -> Similarity:
     flat = {f"{cue}.{when}": table[cue][when] for cue in CUES for when in WHEN} | table["first"]
     return Similarity(np.array([flat[name] for name in feature_names()], dtype=np.float64))

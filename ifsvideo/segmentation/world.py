@@ -8,6 +8,7 @@ Fundamental matrices of frame pairs test less: they do not see a point that slid
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,12 @@ FINALISTS, FINAL_STEPS = 3, 8
 """Starts that are followed to their end, and the steps of each: of two, both are sometimes wrong."""
 LAST_STEPS = 3
 """Steps with all points, from what the few of the starts found."""
+REFIT = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+"""Widths of the steps by which a world is fitted to a part of the points."""
+REFIT_POINTS = 250
+"""Points by which the cameras are fitted then, at most; more tell nothing new."""
+LEAST_POINTS = 8
+"""Points that a world needs: a fundamental matrix has seven unknowns."""
 FALLING = [16.0, 8.0, 4.0, 2.0, 1.4, 1.0]
 """Widths of the robust cost during a start: first everything counts, at last only what fits."""
 
@@ -58,45 +65,75 @@ class World:
     Attributes
     ----------
     frames : (K,) int
-        The frames that were fitted; ``frames[reference]`` defines bearing and depth.
+        The frames that were fitted.
+    bundle : Bundle
+        What was seen in them; its ``reference`` frame defines bearing and depth.
     estimate : Estimate
         Cameras and points.
-    rms : (P,) float
-        Distance of each track from what a static point would do, pixels; NaN where it is seen in fewer than
-        two key frames.
-    tolerance : (P,) float
-        What a static point is granted, pixels.
+    side : float
+        Longer side of the picture, pixels: the unit of the bundle.
+    has_moved : bool
+        Whether the camera changed its place, not only its direction.
     """
 
     frames: NDArray[np.int64]
-    reference: int
+    bundle: Bundle
     estimate: Estimate
-    rms: Array
-    tolerance: Array
+    side: float
+    has_moved: bool
 
+    @cached_property
+    def rms(self) -> Array:
+        """Distance (P,) of each track from what a static point would do, pixels; NaN where it is seen in
+        fewer than two key frames."""
+        error = self.bundle.rms(self.bundle.residual(self.estimate)) * self.side
+        return np.where(self.bundle.seen.sum(axis=0) >= 2, error, np.nan)
 
-def static_evidence(
-    tracks: Tracks, size: tuple[int, int], threshold: float, rng: np.random.Generator
-) -> tuple[Array, World | None]:
-    """How far each track is from a static point's way, in units of ``threshold`` times what is usual in the
-    window.
+    @property
+    def tolerance(self) -> Array:
+        """What a static point is granted (P,), pixels."""
+        return self.bundle.tolerance * self.side
 
-    The usual error is the median over the points that the world explains at all: footage from a rolling
-    shutter behind a wide lens is granted more than a benchmark's.
+    @property
+    def nearness(self) -> Array:
+        """The camera's way over the distance of each point (P,): how much it would have to show of its sides.
 
-    Returns
-    -------
-    evidence : (P,) float
-        Above 1 speaks for motion; 0 where nothing can be said.
-    world : World or None
-    """
-    world = fit_world(tracks, size, rng)
-    if world is None:
-        return np.zeros(tracks.points), None
-    error = np.nan_to_num(world.rms / world.tolerance)
-    explained = error[(error > 0) & (error < 2)]
-    usual = max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
-    return error / (threshold * usual), world
+        A number without unit, 0 for far points, and for all where the camera only turned.
+        """
+        way = self.estimate.t - self.estimate.t.mean(axis=0)
+        return np.asarray(self.estimate.X[:, 2] * np.linalg.norm(way, axis=1).max())
+
+    def evidence(self, threshold: float) -> Array:
+        """How far each track (P,) is from a static point's way, in units of ``threshold`` times what is usual
+        in the window.
+
+        The usual error is the median over the points that the world explains at all: footage from a rolling
+        shutter behind a wide lens is granted more than a benchmark's, and so are places that lie far from
+        the points to which the world was fitted. Above 1 speaks for motion; 0 where nothing can be said.
+        """
+        error = np.nan_to_num(self.rms / self.tolerance)
+        explained = error[(error > 0) & (error < 2)]
+        usual = max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
+        return error / (threshold * usual)
+
+    def fitted_to(self, points: NDArray[np.int64]) -> World:
+        """The world of some points that are surely static, and where all others are in it.
+
+        A world that is fitted to everything explains some of what moves, too: with a few movers at depths of
+        its own choice a camera path is found on which halves of two of them stand still.
+        """
+        if len(points) < LEAST_POINTS:
+            return self
+        few = points[:: 1 + (len(points) - 1) // REFIT_POINTS]
+        before = self.estimate.X
+        own = self.bundle.subset(few).solve(
+            replace(self.estimate, X=before[few]), REFIT, translate=self.has_moved
+        )
+        X = before.copy()
+        # Only the product of depth and the camera's way is known; the others take the few's new scale.
+        X[:, 2] *= (own.X[:, 2] @ before[few, 2]) / max(float(before[few, 2] @ before[few, 2]), 1e-12)
+        X[few] = own.X
+        return replace(self, estimate=self.bundle.solve_points(replace(own, X=X), 6))
 
 
 def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -> World | None:
@@ -105,12 +142,12 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     Returns
     -------
     World or None
-        None where fewer than 8 points are seen in two key frames: nothing can be said.
+        None where fewer than `LEAST_POINTS` points are seen in two key frames: nothing can be said.
     """
     frames = key_frames(tracks.frames, KEY_FRAMES)
     seen = tracks.visible[frames]
     good = seen.sum(axis=0) >= 2
-    if good.sum() < 8:
+    if good.sum() < LEAST_POINTS:
         return None
     side = float(max(size))
     observed = (tracks.xy[frames] - (np.array(size) - 1) / 2) / side
@@ -137,14 +174,7 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     far = bundle.solve_points(_with_all(_all_far(few, turned, X[picked]), X, picked), 3)
     has_moved = _has_moved(bundle, moved, far)
     estimate = bundle.solve(moved if has_moved else far, [1.0] * LAST_STEPS, translate=has_moved)
-    estimate = bundle.solve_points(estimate, 3)
-    return World(
-        frames,
-        reference,
-        estimate,
-        np.where(good, bundle.rms(bundle.residual(estimate)) * side, np.nan),
-        tolerance * side,
-    )
+    return World(frames, bundle, bundle.solve_points(estimate, 3), side, has_moved)
 
 
 def _thin(seen: Bools, cell: NDArray[np.int64], good: Bools, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -1,0 +1,42 @@
+"""The second pass: what a world that is fitted to what is surely static makes of one that was not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ifsvideo.segmentation.agglomeration import Window
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.cues import Cues
+from ifsvideo.segmentation.similarity import learnt
+from ifsvideo.segmentation.static_core import in_static_core
+from ifsvideo.segmentation.world import fit_world
+from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, make_scene
+
+CONFIG = SegmenterConfig()
+
+
+def test_a_world_that_stands_on_a_car_is_put_right() -> None:
+    """The world at first is the one in which a car stands still and all else moves a little."""
+    scene = make_scene(Camera.path(step=(0.1, 0, 0.2)), (LEFT_CAR, RIGHT_CAR), seed=1)
+    tracks, truth = scene.tracks, scene.truth
+    right = fit_world(tracks, SIZE, np.random.default_rng(0))
+    assert right is not None
+    wrong = right.fitted_to(np.flatnonzero(truth == 1))
+    first = Cues(tracks, tracks.xy[0], np.full(tracks.points, 0.8), wrong.nearness, 1.0, CONFIG.pairs)
+    window = Window(truth, np.ones(len(truth), dtype=bool), SIZE)
+    cues = in_static_core(first, window, wrong, learnt().core, CONFIG)
+    assert np.median(wrong.evidence(5.0)[truth == 0]) > 1
+    assert np.median(cues.evidence[truth == 0]) < 0.5
+    for car in (1, 2):
+        assert np.median(cues.evidence[truth == car]) > 1
+
+
+def test_without_a_world_or_a_second_pass_nothing_changes() -> None:
+    scene = make_scene(movers=(LEFT_CAR,))
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    cues = Cues(scene.tracks, scene.tracks.xy[0], np.ones(scene.tracks.points), np.zeros(1), 1.0, 10)
+    window = Window(scene.truth, np.ones(len(scene.truth), dtype=bool), SIZE)
+    assert in_static_core(cues, window, None, learnt().core, CONFIG) is cues
+    assert in_static_core(cues, window, world, learnt().core, replace(CONFIG, core_doubt=0.0)) is cues
