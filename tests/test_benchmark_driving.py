@@ -139,7 +139,8 @@ def test_both_halves_are_alike_where_the_result_is_the_truth(truth: int, dataset
     side_by_side.draw_all(sequences, dataset, method, Trial(quiet=True), tmp_path)
     image = next(open_source(tmp_path / "clip.mp4").frames()).astype(int)
     difference = np.abs(image[20:40] - image[80:100]).mean()
-    assert difference < 3 if truth == 2 else difference > 10
+    # The encoder spoils a picture of noise by three grey levels; points in other colours are four times that.
+    assert difference < 5 if truth == 2 else difference > 10
 
 
 def test_command_reports_frames_and_floors(
