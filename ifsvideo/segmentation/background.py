@@ -31,6 +31,8 @@ def merge_and_label(
     merging : Agglomeration
         With the measurements and the rule; keeps what it merged.
     window : Window
+    motions : int, optional
+        As of `Agglomeration.run`.
 
     Returns
     -------

@@ -30,6 +30,8 @@ def in_static_core(
         That of stage 1; where there is none, nothing changes.
     rule : Similarity
         Which segments are one motion, in a world that may be wrong.
+    config : SegmenterConfig
+        ``core_doubt`` 0 leaves out this pass.
     """
     if world is None or config.core_doubt == 0:
         return cues
