@@ -134,8 +134,9 @@ def test_truth_above_result_of_a_wide_clip(dataset: Path, tmp_path: Path):
 
 @pytest.mark.parametrize("truth", [1, 2], ids=["nothing moves", "all moves"])
 def test_both_halves_are_alike_where_the_result_is_the_truth(truth: int, dataset: Path, tmp_path: Path):
+    # Pictures of noise would differ by the encoder alone.
     for file in (dataset / "OriginalSequences" / "clip").iterdir():
-        iio.imwrite(file, np.full((SIZE[1], SIZE[0], 3), 128, np.uint8))  # noise would differ by the encoder alone
+        iio.imwrite(file, np.full((SIZE[1], SIZE[0], 3), 128, np.uint8))
     sequences = [replace(one, truth=np.full(4, truth)) for one in datasets.load("kt3dmoseg", dataset)]
     method = Method("all", AllMove, motions_known=False)
     side_by_side.draw_all(sequences, dataset, method, Trial(quiet=True), tmp_path)
