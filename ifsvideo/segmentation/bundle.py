@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.segmentation.triangles import Triangles
 from ifsvideo.types import Bools
 
 Array = NDArray[np.float64]
@@ -30,9 +31,11 @@ _GLOBALS = 2
 
 def skew(v: Array) -> Array:
     """Cross-product matrices (..., 3, 3) of vectors (..., 3)."""
-    x, y, z = np.moveaxis(v, -1, 0)
-    o = np.zeros_like(x)
-    return np.stack([np.stack([o, -z, y], -1), np.stack([z, o, -x], -1), np.stack([-y, x, o], -1)], -2)
+    cross = np.zeros((*v.shape, 3))
+    for row, column, axis in ((2, 1, 0), (0, 2, 1), (1, 0, 2)):
+        cross[..., row, column] = v[..., axis]
+        cross[..., column, row] = -v[..., axis]
+    return cross
 
 
 def rotation(omega: Array) -> Array:
@@ -42,12 +45,6 @@ def rotation(omega: Array) -> Array:
     return np.asarray(
         np.eye(3) + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * (cross @ cross)
     )
-
-
-def by_points(J: Array) -> Array:
-    """Measurements (K, P, 2, N) of K cameras as those of P points, (P, 2K, N): then a sum over all that is
-    seen of a point is one product of matrices."""
-    return J.transpose(1, 0, 2, 3).reshape(J.shape[1], -1, J.shape[3])
 
 
 @dataclass(frozen=True)
@@ -68,20 +65,24 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Projection:
-    """Intermediate values of a projection, kept for its derivatives."""
+    """Intermediate values of a projection, kept for its derivatives: R (a, b, 1) (K, 3, P), depth (K, P),
+    xy and u (K, 2, P), the square of xy (K, P)."""
 
     turned: Array
     depth: Array
     xy: Array
+    square: Array
     u: Array
 
 
 class Bundle:
     """The observations of one window.
 
+    Arrays have the points last: what is done to all of them is then one run through memory.
+
     Parameters
     ----------
-    observed : (K, P, 2) float, normalised
+    observed : (K, 2, P) float, normalised
     seen : (K, P) bool
     weight : (P,) float
         Importance of each point.
@@ -104,7 +105,7 @@ class Bundle:
         lens_spread: Array,
     ) -> None:
         self.seen = seen
-        self.observed = np.where(seen[..., None], observed, 0.0)
+        self.observed = np.where(seen[:, None], observed, 0.0)
         self.weight = weight
         self.tolerance = tolerance
         self.reference = reference
@@ -117,7 +118,7 @@ class Bundle:
     def subset(self, points: NDArray[np.int64]) -> Bundle:
         """The same window, some of its points."""
         return Bundle(
-            self.observed[:, points],
+            self.observed[..., points],
             self.seen[:, points],
             self.weight[points],
             self.tolerance[points],
@@ -128,29 +129,30 @@ class Bundle:
 
     def project(self, e: Estimate) -> Projection:
         """Where the cameras see the points."""
-        bearing = np.column_stack([e.X[:, :2], np.ones(len(e.X))])
-        turned = bearing @ e.R.transpose(0, 2, 1)
-        q = turned + e.X[None, :, 2, None] * e.t[:, None]
-        depth = np.maximum(q[..., 2], _NEAREST)
-        xy = q[..., :2] / depth[..., None]
-        bend = 1 + e.k1 * (xy**2).sum(axis=2, keepdims=True)
-        return Projection(turned, depth, xy, np.exp(e.log_focal) * bend * xy)
+        turned = e.R @ np.vstack([e.X[:, :2].T, np.ones(len(e.X))])
+        q = turned + e.t[:, :, None] * e.X[:, 2]
+        depth = np.maximum(q[:, 2], _NEAREST)
+        xy = q[:, :2] / depth[:, None]
+        square = np.einsum("kip,kip->kp", xy, xy)
+        return Projection(
+            turned, depth, xy, square, (np.exp(e.log_focal) * (1 + e.k1 * square))[:, None] * xy
+        )
 
     def residual(self, e: Estimate) -> Array:
-        """Projection minus observation (K, P, 2), zero where unseen."""
+        """Projection minus observation (K, 2, P), zero where unseen."""
         return self._missed(self.project(e))
 
     def _missed(self, p: Projection) -> Array:
-        return np.where(self.seen[..., None], p.u - self.observed, 0.0)
+        return np.where(self.seen[:, None], p.u - self.observed, 0.0)
 
     def rms(self, residual: Array) -> Array:
         """Root of the mean square residual of each point (P,), normalised units, its own unknowns taken
         off."""
-        return np.asarray(np.sqrt((residual**2).sum(axis=(0, 2)) / self.freedom))
+        return np.asarray(np.sqrt(_square(residual) / self.freedom))
 
     def cost(self, residual: Array, width: float) -> float:
         """Mean of e^2 / (1 + e^2) over the points, e = rms / (width * tolerance): 0 all fit, 1 none does."""
-        square = (self.rms(residual) / (width * self.tolerance)) ** 2
+        square = _square(residual) / (self.freedom * (width * self.tolerance) ** 2)
         return float((self.weight * square / (1 + square)).sum() / self.weight.sum())
 
     def solve(self, e: Estimate, widths: list[float], translate: bool = True) -> Estimate:
@@ -178,100 +180,111 @@ class Bundle:
     def solve_points(self, e: Estimate, iterations: int) -> Estimate:
         """Points alone, each by itself, cameras fixed."""
         damping = np.full(len(e.X), 1e-3)
-        residual = self.residual(e)
-        cost = (residual**2).sum(axis=(0, 2))
+        seen = self.project(e)
+        residual = self._missed(seen)
+        cost = _square(residual)
         for _ in range(iterations):
-            p = self.project(e)
-            Jx = by_points(self._by_point(e, self._by_place(e, p)))
-            V = Jx.transpose(0, 2, 1) @ Jx
-            g = (Jx.transpose(0, 2, 1) @ by_points(residual[..., None]))[:, :, 0]
-            V += (damping[:, None] * np.einsum("paa->pa", V) + 1e-9)[:, :, None] * np.eye(3)
-            X = e.X - np.linalg.solve(V, g[:, :, None])[:, :, 0]
+            J = self._by_point(e, self._by_place(e, seen))
+            V = np.einsum("kaip,kbip->abp", J, J)
+            g = np.einsum("kaip,kip->ap", J, residual)
+            for axis in range(3):
+                V[axis, axis] += damping * V[axis, axis] + 1e-9
+            X = e.X - Triangles(V).solve(g).T
             behind = X[:, 2] < 0
             if behind.any():
                 # At the bound the bearing moves with rho held at 0.
-                pull = g[behind, :2] - V[behind, :2, 2] * e.X[behind, 2, None]
-                X[behind, :2] = (
-                    e.X[behind, :2] - np.linalg.solve(V[behind, :2, :2], pull[:, :, None])[:, :, 0]
-                )
+                pull = g[:2, behind] - V[:2, 2, behind] * e.X[behind, 2]
+                X[behind, :2] = e.X[behind, :2] - Triangles(V[:2, :2, behind]).solve(pull).T
                 X[behind, 2] = 0.0
             moved = replace(e, X=X)
-            new = self.residual(moved)
-            better = (new**2).sum(axis=(0, 2)) <= cost
+            seen_then = self.project(moved)
+            new = self._missed(seen_then)
+            square = _square(new)
+            better = square <= cost
             e = replace(e, X=np.where(better[:, None], X, e.X))
-            residual = np.where(better[None, :, None], new, residual)
-            cost = (residual**2).sum(axis=(0, 2))
+            seen = seen_then if better.all() else self.project(e)
+            residual = np.where(better, new, residual)
+            cost = np.where(better, square, cost)
             damping = np.where(better, damping / 10, damping * 10)
         return e
 
-    def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array, Array]:
-        """Derivatives of the projections by camera (K, P, 2, 6), point (K, P, 2, 3), lens (K, P, 2, 2); zero
-        where unseen."""
-        by_q = self._by_place(e, p)
-        by_camera = np.concatenate([-by_q @ skew(p.turned), by_q * e.X[None, :, 2, None, None]], axis=3)
-        square = (p.xy**2).sum(axis=2)
-        by_lens = np.stack([p.u, np.exp(e.log_focal) * p.xy * square[..., None]], axis=3)
-        return by_camera, self._by_point(e, by_q), by_lens * self.seen[..., None, None]
+    def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array]:
+        """Derivatives of the projections by camera (rotation, place) and lens (K, 8, 2, P), and by point
+        (K, 3, 2, P); zero where unseen."""
+        by_q, v = self._by_place(e, p), p.turned[:, :, None]
+        J = np.empty((len(e.R), 6 + _GLOBALS, 2, len(e.X)))
+        for axis in range(3):  # v x dq
+            after, last = (axis + 1) % 3, (axis + 2) % 3
+            np.multiply(v[:, after], by_q[:, last], out=J[:, axis])
+            J[:, axis] -= v[:, last] * by_q[:, after]
+        np.multiply(by_q, e.X[:, 2], out=J[:, 3:6])
+        np.multiply(p.u, self.seen[:, None], out=J[:, 6])
+        np.multiply(p.xy, (np.exp(e.log_focal) * p.square * self.seen)[:, None], out=J[:, 7])
+        return J, self._by_point(e, by_q)
 
     def _by_place(self, e: Estimate, p: Projection) -> Array:
-        """Derivatives of the projections by q (K, P, 2, 3)."""
-        square = (p.xy**2).sum(axis=2)
-        by_xy = 2 * e.k1 * p.xy[..., :, None] * p.xy[..., None, :]
-        by_xy += (1 + e.k1 * square)[..., None, None] * np.eye(2)
-        by_xy *= (np.exp(e.log_focal) * self.seen / p.depth)[..., None, None]
-        return np.concatenate([by_xy, -np.einsum("kpij,kpj->kpi", by_xy, p.xy)[..., None]], axis=3)
+        """Derivatives of the projections by q (K, 3, 2, P)."""
+        scale = np.exp(e.log_focal) * self.seen / p.depth
+        by_q = np.empty((len(scale), 3, 2, scale.shape[1]))
+        np.multiply(p.xy[:, :, None], (2 * e.k1 * scale)[:, None, None] * p.xy[:, None], out=by_q[:, :2])
+        straight = scale * (1 + e.k1 * p.square)
+        for axis in range(2):
+            by_q[:, axis, axis] += straight
+        np.einsum("kqip,kqp->kip", by_q[:, :2], -p.xy, out=by_q[:, 2])
+        return by_q
 
     def _by_point(self, e: Estimate, by_q: Array) -> Array:
-        """Derivatives of the projections by (a, b, rho), (K, P, 2, 3)."""
-        axes = np.stack([e.R[:, :, 0], e.R[:, :, 1], e.t], axis=2)  # dq / d(a, b, rho)
-        return np.asarray(by_q @ axes[:, None])
+        """Derivatives of the projections by (a, b, rho), (K, 3, 2, P)."""
+        axes = np.stack([e.R[:, :, 0], e.R[:, :, 1], e.t], axis=1)  # dq / d(a, b, rho)
+        return (axes @ by_q.reshape(len(axes), 3, -1)).reshape(by_q.shape)
 
     def _step(
         self, e: Estimate, p: Projection, residual: Array, width: float, damping: float, translate: bool
     ) -> Estimate:
         """One damped Gauss-Newton step: points are eliminated, cameras and lens solved, points filled in
         again."""
-        Jc, Jx, Jl = self._derivatives(e, p)
+        J, own = self._derivatives(e, p)
         if not translate:
-            Jc[..., 3:] = 0.0
-            Jx[..., 2] = 0.0
-        square = (self.rms(residual) / (width * self.tolerance)) ** 2
+            J[:, 3:6] = 0.0
+            own[:, 2] = 0.0
+        square = _square(residual) / (self.freedom * (width * self.tolerance) ** 2)
         weight = self.weight / (1 + square) ** 2 / self.tolerance**2 / self.freedom
-        free, cameras = self._free, len(e.R)
-        shared = 6 * len(free) + _GLOBALS
+        U, gradient = self._of_cameras(e, J, residual, weight)
+        own_heavy = own * weight
+        V = np.einsum("kaip,kbip->abp", own_heavy, own)
+        trace = np.einsum("aap->p", V) + 1e-12 * float(weight.max(initial=1.0))
+        for axis in range(3):
+            V[axis, axis] += (1e-3 * damping + 1e-12) * trace
+        # (shared, 3, P): cameras and lens against points.
+        cross = np.einsum("kcip,kaip->kcap", J, own_heavy)
+        with_cameras = cross[self._free, :6].reshape(-1, *cross.shape[2:])
+        points = Triangles(V)
+        half = points.halfway(np.concatenate([with_cameras, cross[:, 6:].sum(axis=0)]))
+        own_half = points.halfway(np.einsum("kaip,kip->ap", own_heavy, residual))
+        eliminated = half.reshape(len(half), -1)
+        S = U - eliminated @ eliminated.T
+        S += np.diag(damping * np.diag(U) + 1e-9 * np.trace(U) / len(U))
+        shared_step = -np.asarray(np.linalg.solve(S, gradient - eliminated @ own_half.ravel()), np.float64)
+        own_step = points.rest(-own_half - (shared_step @ eliminated).reshape(own_half.shape))
+        return self._moved(e, shared_step, own_step.T, translate)
 
-        # A camera's unknowns touch its own measurements only: blocks (K, 6 or 2, ...) instead of one matrix.
-        by_camera, by_lens = (J.reshape(cameras, -1, J.shape[3]) for J in (Jc, Jl))
-        heavy = np.repeat(weight, 2)[None, :, None]
-        r = residual.reshape(cameras, -1, 1)
-        heavy_camera_t = (by_camera * heavy).transpose(0, 2, 1)
-        heavy_lens_t = (by_lens * heavy).transpose(0, 2, 1)
+    def _of_cameras(self, e: Estimate, J: Array, residual: Array, weight: Array) -> tuple[Array, Array]:
+        """Normal equations of cameras and lens alone (shared, shared), and their gradient (shared,)."""
+        free, shared = self._free, 6 * len(self._free) + _GLOBALS
+        # A camera's unknowns touch its own measurements only: blocks (K, 8, 8) instead of one matrix.
+        heavy = (J * weight).reshape(*J.shape[:2], -1)
+        blocks = heavy @ J.reshape(heavy.shape).transpose(0, 2, 1)
+        pull = (heavy @ residual.reshape(len(J), -1, 1))[:, :, 0]
         U = np.zeros((shared, shared))
-        blocks, beside = heavy_camera_t @ by_camera, heavy_camera_t @ by_lens
         for column, k in enumerate(free):
             rows = slice(6 * column, 6 * column + 6)
-            U[rows, rows] = blocks[k]
-            U[rows, -_GLOBALS:] = beside[k]
-            U[-_GLOBALS:, rows] = beside[k].T
-        U[-_GLOBALS:, -_GLOBALS:] = (heavy_lens_t @ by_lens).sum(axis=0) + np.diag(1 / self.lens_spread**2)
-        gradient = np.append((heavy_camera_t @ r)[free].ravel(), (heavy_lens_t @ r).sum(axis=0).ravel())
+            U[rows, rows] = blocks[k, :6, :6]
+            U[rows, -_GLOBALS:] = blocks[k, :6, 6:]
+            U[-_GLOBALS:, rows] = blocks[k, 6:, :6]
+        U[-_GLOBALS:, -_GLOBALS:] = blocks[:, 6:, 6:].sum(axis=0) + np.diag(1 / self.lens_spread**2)
+        gradient = np.append(pull[free, :6].ravel(), pull[:, 6:].sum(axis=0))
         gradient[-_GLOBALS:] += (e.lens - self.lens_prior) / self.lens_spread**2
-
-        own_t = (Jx * weight[:, None, None]).transpose(0, 1, 3, 2)
-        V = (own_t @ Jx).sum(axis=0)
-        trace = np.einsum("paa->p", V) + 1e-12 * float(weight.max(initial=1.0))
-        V = V + (1e-3 * damping * trace)[:, None, None] * np.eye(3) + 1e-12 * trace[:, None, None] * np.eye(3)
-        own_gradient = (own_t @ residual[..., None]).sum(axis=0)[:, :, 0]
-        # (P, 3, shared): points against cameras and lens.
-        with_cameras = (own_t[free] @ Jc[free]).transpose(1, 2, 0, 3).reshape(len(e.X), 3, -1)
-        cross = np.concatenate([with_cameras, (own_t @ Jl).sum(axis=0)], axis=2)
-        inverse = np.linalg.inv(V)
-        eliminated = (inverse @ cross).reshape(-1, shared)
-        S = U - cross.reshape(-1, shared).T @ eliminated
-        S += np.diag(damping * np.diag(U) + 1e-9 * np.trace(U) / shared)
-        shared_step = -np.linalg.solve(S, gradient - eliminated.T @ own_gradient.ravel())
-        own_step = -np.einsum("pab,pb->pa", inverse, own_gradient + cross @ shared_step)
-        return self._moved(e, shared_step, own_step, translate)
+        return U, gradient
 
     def _moved(self, e: Estimate, shared_step: Array, own_step: Array, translate: bool) -> Estimate:
         """The estimate after a step, its free scale fixed: root mean square of the camera's distances 1, rho
@@ -291,3 +304,8 @@ class Bundle:
         low, high = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
         log_focal, k1 = np.clip(lens, low, high)
         return Estimate(R, t, X, float(log_focal), float(k1))
+
+
+def _square(residual: Array) -> Array:
+    """Sum of squares of each point's residuals (K, 2, P)."""
+    return np.asarray(np.einsum("kip,kip->p", residual, residual))

@@ -163,7 +163,9 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     cell = np.floor((place + 0.5) * 16).astype(int) @ [1, 1000]
     _, inverse, count = np.unique(cell, return_inverse=True, return_counts=True)
     weight = np.where(good, 1 / np.sqrt(count[inverse]), 0.0)  # dense texture does not outvote the rest
-    bundle = Bundle(observed, seen & good, weight, tolerance, reference, LENS_PRIOR, LENS_SPREAD)
+    bundle = Bundle(
+        observed.transpose(0, 2, 1), seen & good, weight, tolerance, reference, LENS_PRIOR, LENS_SPREAD
+    )
 
     picked = _thin(seen, cell, good, rng)
     time = (frames - frames[reference]) / max(frames[-1] - frames[0], 1)
@@ -213,8 +215,8 @@ def _has_moved(bundle: Bundle, moved: Estimate, far: Estimate) -> bool:
     near = bundle.rms(bundle.residual(moved)) < bundle.tolerance
     still = bundle.rms(bundle.residual(far)) < 2 * bundle.tolerance
     counted = bundle.weight > 0
-    place = np.nanmean(np.where(bundle.seen[..., None], bundle.observed, np.nan)[:, counted], axis=0)
-    cell = np.floor((place + 0.5) * PARALLAX_CELLS).astype(int) @ [1, 100]
+    place = bundle.observed[..., counted].sum(axis=0) / bundle.seen[:, counted].sum(axis=0)
+    cell = np.array([1, 100]) @ np.floor((place + 0.5) * PARALLAX_CELLS).astype(int)
     needing = np.unique(cell[(near & ~still)[counted]])
     return len(needing) >= PARALLAX_SHARE * len(np.unique(cell))
 

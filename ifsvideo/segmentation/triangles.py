@@ -1,0 +1,49 @@
+"""Many small symmetric systems at once: LAPACK takes them one by one and spends more time on each call than
+on the work."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Triangles:
+    """Symmetric positive matrices (N, N, P) of a few rows, one for each of P points, as L L^T with triangles
+    L (Cholesky)."""
+
+    def __init__(self, V: Array) -> None:
+        self._L: list[list[Array]] = []
+        for row in range(len(V)):
+            L: list[Array] = []
+            for column in range(row):
+                above = self._L[column]
+                rest = V[row, column] - sum(x * y for x, y in zip(L, above, strict=False))
+                L.append(rest / above[column])
+            L.append(np.sqrt(V[row, row] - sum(x * x for x in L)))
+            self._L.append(L)
+
+    def halfway(self, right: Array) -> Array:
+        """L^-1 times columns (..., N, P)."""
+        found = np.empty_like(right)
+        for row, L in enumerate(self._L):
+            rest = right[..., row, :]
+            for column in range(row):
+                rest = rest - L[column] * found[..., column, :]
+            np.divide(rest, L[row], out=found[..., row, :])
+        return found
+
+    def rest(self, half: Array) -> Array:
+        """L^-T times columns (N, P): what `halfway` left to do."""
+        found = np.empty_like(half)
+        for row in reversed(range(len(self._L))):
+            rest = half[row]
+            for below in range(row + 1, len(self._L)):
+                rest = rest - self._L[below][row] * found[below]
+            np.divide(rest, self._L[row][row], out=found[row])
+        return found
+
+    def solve(self, right: Array) -> Array:
+        """Solutions (N, P) for right sides (N, P)."""
+        return self.rest(self.halfway(right))
