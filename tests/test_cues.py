@@ -177,8 +177,17 @@ def test_depth_is_what_parts_two_groups_over_what_spreads_them() -> None:
     assert cue("depth", cues, one, one) == pytest.approx(0.1)
 
 
+def test_another_world_measures_nothing_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    cues, pieces = measure(bodies())
+    before = cues.between([(pieces[0], pieces[2])])
+    moved = cues.in_world(cues.evidence, cues.nearness)
+    monkeypatch.setattr(shear, "totals", None)  # by which all are measured
+    pieces = moved.groups([(group.members, group.reliable) for group in pieces])
+    assert np.array_equal(moved.between([(pieces[0], pieces[2])]), before)
+
+
 def test_another_world_changes_evidence_and_depth_alone() -> None:
-    """What was measured before is kept, and is what would be measured again."""
+    """What was measured before is what would be measured again."""
     tracks = bodies()
     rng = np.random.default_rng(3)
     cues, pieces = measure(tracks)

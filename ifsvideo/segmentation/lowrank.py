@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.segmentation.key_frames import key_frames
+from ifsvideo.segmentation.triangles import Triangles
 from ifsvideo.types import Tracks
 
 Array = NDArray[np.float64]
@@ -46,8 +47,7 @@ class Subspace:
         rank = min(rank, points - 1, len(W))
         filled = along_mean_path(W, seen)
         mean = filled.mean(axis=1)
-        U, S, _ = np.linalg.svd(filled - mean[:, None], full_matrices=False)
-        found = cls(U[:, :rank] * (S[:rank] / np.sqrt(points)), mean)
+        found = cls(principal(filled - mean[:, None], rank) / np.sqrt(points), mean)
         if rank < 1 or seen.all():
             return found
         for _ in range(iterations):
@@ -55,7 +55,7 @@ class Subspace:
             # Each row of W: its directions and mean from the points that are seen in it.
             products = (place[:, None] * place[None]).reshape(-1, points)
             left = (seen @ products.T).reshape(-1, rank + 1, rank + 1) + 1e-6 * np.eye(rank + 1)
-            rows = np.linalg.solve(left, ((W * seen) @ place.T)[:, :, None])[:, :, 0]
+            rows = np.linalg.solve(left, (W @ place.T)[:, :, None])[:, :, 0]
             found = cls(rows[:, :rank], rows[:, rank])
         return found
 
@@ -65,9 +65,8 @@ class Subspace:
             return self
         inside = self._coordinates(W, seen)
         mean = inside.mean(axis=1)
-        U, S, _ = np.linalg.svd(self.directions @ (inside - mean[:, None]), full_matrices=False)
-        scale = S[:rank] / np.sqrt(W.shape[1])
-        return Subspace(U[:, :rank] * scale, self.mean + self.directions @ mean)
+        spread = self.directions @ principal(inside - mean[:, None], self.rank)
+        return Subspace(principal(spread, rank) / np.sqrt(W.shape[1]), self.mean + self.directions @ mean)
 
     @property
     def rank(self) -> int:
@@ -85,17 +84,30 @@ class Subspace:
         """
         error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
         free = np.maximum((seen.sum(axis=0) - self.rank) / 2, 0.5)
-        return np.asarray(np.sqrt((error**2).sum(axis=0) / free))
+        return np.asarray(np.sqrt(np.einsum("fp,fp->p", error, error) / free))
 
     def _coordinates(self, W: Array, seen: Array) -> Array:
         """Coordinates (rank, P) of the nearest points of the subspace."""
         M, rank = self.directions, self.rank
-        products = (M[:, :, None] * M[:, None]).reshape(len(M), -1)
-        left = (seen.T @ products).reshape(seen.shape[1], rank, rank)
-        size = np.einsum("paa->p", left) + 1e-9
-        left = left + (1e-6 * size)[:, None, None] * np.eye(rank)
-        right = ((W - self.mean[:, None]) * seen).T @ M
-        return np.asarray(np.linalg.solve(left, right[:, :, None])[:, :, 0].T)
+        left = ((M[:, :, None] * M[:, None]).reshape(len(M), rank**2).T @ seen).reshape(
+            rank, rank, W.shape[1]
+        )
+        ridge = 1e-6 * (np.einsum("aap->p", left) + 1e-9)
+        for axis in range(rank):
+            left[axis, axis] += ridge
+        return Triangles(left).solve(M.T @ W - (M * self.mean[:, None]).T @ seen)
+
+
+def principal(X: Array, rank: int) -> Array:
+    """The first left singular vectors of X (R, C), times their singular values (R, rank).
+
+    By way of the smaller of its two products with itself, in half the time; a direction that holds less than
+    1e-8 of the spread is lost by it.
+    """
+    if len(X) > X.shape[1]:
+        return np.asarray(X @ np.linalg.eigh(X.T @ X)[1][:, ::-1][:, :rank])
+    square, U = np.linalg.eigh(X @ X.T)
+    return np.asarray((U * np.sqrt(np.maximum(square, 0.0)))[:, ::-1][:, :rank])
 
 
 def along_mean_path(W: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.float64]:
