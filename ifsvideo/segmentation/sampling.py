@@ -67,7 +67,8 @@ def sample_models(
     AffineModels
         At most ``config.models``; fewer where no disk holds three points.
     """
-    usable = tracks.visible[base]
+    window = _Window.of(tracks, base)
+    usable, place = window.usable, window.place.T
     pools = [np.flatnonzero(usable & ~background), np.flatnonzero(usable & background)]
     inliers: list[Bools] = []
     controls: list[NDArray[np.float64]] = []
@@ -81,15 +82,15 @@ def sample_models(
         pool = pools[0] if (fg and len(pools[0])) or not len(pools[1]) else pools[1]
         fg = pool is pools[0]
         centre = int(rng.choice(pool))
-        distance = np.linalg.norm(tracks.xy[base] - tracks.xy[base, centre], axis=1)
+        distance = np.linalg.norm(place - place[centre], axis=1)
         support = np.flatnonzero(usable & (distance < config.disk_radius * unit))  # eq. 3.1
         through = centre if config.through_centre else None
-        best = _best_triple(tracks, support, through, base, unit, config, rng)
+        best = _best_triple(window, support, through, unit, config, rng)
         if best is not None:
             mask = np.zeros(tracks.points, dtype=bool)
             mask[best[0]] = True
             inliers.append(mask)
-            controls.append(tracks.xy[base, best[1]])
+            controls.append(place[best[1]])
             foreground.append(fg)
     return AffineModels(
         np.array(inliers, dtype=bool).reshape(len(inliers), tracks.points),
@@ -98,11 +99,27 @@ def sample_models(
     )
 
 
+@dataclass(frozen=True)
+class _Window:
+    """The tracks with the points last: place (2, P) in the base frame, usable (P,) whether they are seen
+    there; path (2 (F - 1), P), x and y in turn, and seen (F - 1, P) in the other frames."""
+
+    place: NDArray[np.float64]
+    usable: Bools
+    path: NDArray[np.float64]
+    seen: Bools
+
+    @classmethod
+    def of(cls, tracks: Tracks, base: int) -> _Window:
+        other = np.arange(tracks.frames) != base  # the base frame maps to itself
+        path = tracks.xy[other].transpose(0, 2, 1).reshape(2 * other.sum(), tracks.points)
+        return cls(tracks.xy[base].T.copy(), tracks.visible[base], path, tracks.visible[other])
+
+
 def _best_triple(
-    tracks: Tracks,
+    window: _Window,
     support: NDArray[np.int64],
     through: int | None,
-    base: int,
     unit: float,
     config: SegmenterConfig,
     rng: np.random.Generator,
@@ -116,29 +133,29 @@ def _best_triple(
     if through is not None:
         own = int(np.searchsorted(support, through))
         triples[~(triples == own).any(axis=1), 0] = own
-    xy = tracks.xy[:, support]
-    seen = tracks.visible[:, support]
-    corners = xy[base, triples]
-    edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = np.abs(edge1[:, 0] * edge2[:, 1] - edge1[:, 1] * edge2[:, 0]) / 2
-    triples = triples[area > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2]
-    if not len(triples):
+    place = window.place[:, support]
+    first = place[:, triples[:, 0]]
+    (x1, y1), (x2, y2) = (place[:, triples[:, k]] - first for k in (1, 2))
+    twice_area = x1 * y2 - y1 * x2
+    wide = np.abs(twice_area) / 2 > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2
+    if not wide.any():
         return None
+    triples = triples[wide]
     # eq. 3.2: A_{1->f} = [c_f; 1] [c_1; 1]^-1, so a point is transferred by its barycentric coordinates in
     # c_1.
-    ones = np.ones((len(triples), 1, 3))
-    barycentric = np.linalg.solve(
-        np.concatenate([xy[base, triples].transpose(0, 2, 1), ones], axis=1),
-        np.broadcast_to(np.vstack([xy[base].T, np.ones(len(support))]), (len(triples), 3, len(support))),
-    )
-    moved = np.einsum("tcp,ftcx->tfpx", barycentric, xy[:, triples])
-    together: Bools = np.asarray(seen[:, triples].all(axis=2), dtype=bool)  # (F, T)
-    known: Bools = seen[None] & together.T[:, :, None]
-    known[:, base, :] = False  # the base frame maps to itself
-    with np.errstate(invalid="ignore"):
-        fits = known & (np.linalg.norm(moved - xy[None], axis=3) < config.inlier_error * unit)
-    counted = known.sum(axis=1)
-    inlier = np.asarray((fits.sum(axis=1) >= 0.5 * counted) & (counted > 0))
+    x, y = place[:, None] - first[:, wide, None]
+    (x1, y1), (x2, y2) = ((p[wide, None], q[wide, None]) for p, q in ((x1, y1), (x2, y2)))
+    second, third = np.array([x * y2 - y * x2, x1 * y - y1 * x]) / twice_area[wide, None]
+    barycentric = np.stack([1 - second - third, second, third], axis=1)
+    path, seen = window.path[:, support], window.seen[:, support]
+    error = (
+        path[:, triples].transpose(1, 0, 2) @ barycentric
+    )  # (T, 2 (F - 1), P), NaN where a corner is unseen
+    error -= path
+    np.multiply(error, error, out=error)
+    fits = error[:, ::2] + error[:, 1::2] < (config.inlier_error * unit) ** 2
+    counted = seen[:, triples].all(axis=2).T.astype(np.float64) @ seen
+    inlier = (fits.sum(axis=1) >= 0.5 * counted) & (counted > 0)
     winner = int(np.argmax(inlier.sum(axis=1)))
     chosen = np.array(inlier[winner])
     chosen[triples[winner]] = True
