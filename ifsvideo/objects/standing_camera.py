@@ -99,36 +99,32 @@ def sure_of_added(labels: NDArray[np.int64], added: Bools) -> Array:
 def _departures(tracks: Tracks, ground: NDArray[np.int64], unit: float) -> Array | None:
     """How far each track (P,) ever is from where a static point would be, pixels; None where parallax shows,
     or the background is too small to tell."""
-    steps = _homographies(tracks, ground, unit)
-    if steps is None:
-        return None
     static = np.zeros((tracks.points, 2))
     left = np.zeros(tracks.points)
     first = np.argmax(tracks.visible, axis=0)
     for frame, seen in enumerate(tracks.visible):
         if frame:
-            static = cv2.perspectiveTransform(static[None], steps[frame - 1])[0]
+            step = _homography(tracks, ground, frame, unit)
+            if step is None:
+                return None
+            static = cv2.perspectiveTransform(static[None], step)[0]
         begins = first == frame
         static[begins] = tracks.xy[frame, begins]
         off = np.linalg.norm(tracks.xy[frame] - static, axis=1)
         left[seen] = np.maximum(left[seen], off[seen])
-    fits = np.mean(left[ground] <= _FITTING * unit)
-    return left if fits >= _LEAST_FITTING else None
+        if np.count_nonzero(left[ground] <= _FITTING * unit) < _LEAST_FITTING * len(ground):
+            return None  # what has left does not come back
+    return left
 
 
-def _homographies(tracks: Tracks, ground: NDArray[np.int64], unit: float) -> list[Array] | None:
-    """From each frame to the next, what the background does; None where it is too small."""
-    steps = []
-    for frame in range(tracks.frames - 1):
-        both = ground[tracks.visible[frame : frame + 2, ground].all(axis=0)]
-        if len(both) < _LEAST_GROUND:
-            return None
-        here, there = tracks.xy[frame : frame + 2, both]
-        step, _ = cv2.findHomography(here, there, cv2.RANSAC, _FITTING * unit, maxIters=_DRAWS)
-        if step is None:
-            return None
-        steps.append(np.asarray(step, np.float64))
-    return steps
+def _homography(tracks: Tracks, ground: NDArray[np.int64], frame: int, unit: float) -> Array | None:
+    """From the frame before to this one, what the background does; None where it is too small."""
+    both = ground[tracks.visible[frame - 1 : frame + 1, ground].all(axis=0)]
+    if len(both) < _LEAST_GROUND:
+        return None
+    here, there = tracks.xy[frame - 1 : frame + 1, both]
+    step, _ = cv2.findHomography(here, there, cv2.RANSAC, _FITTING * unit, maxIters=_DRAWS)
+    return None if step is None else np.asarray(step, np.float64)
 
 
 def _courses(tracks: Tracks) -> tuple[Array, Array]:

@@ -179,14 +179,28 @@ def follow_neighbours(
     usable = decided[labels != UNDECIDED]
     count = tracks.visible.sum(axis=0)
     short = np.setdiff1d(np.flatnonzero(count >= 2), decided)
-    # A neighbour is who is near in the middle of the track's life.
-    middle = np.argmax(np.cumsum(tracks.visible[:, short], axis=0) > count[short] // 2, axis=0)
-    for frame in np.unique(middle).tolist():
-        near = usable[tracks.visible[frame, usable]]
-        if len(near):
-            group = short[middle == frame]
-            result[group] = _votes(tracks, group, frame, near, result, unit)
+    if len(short) and len(usable):
+        distance, near = _neighbours(tracks, short, usable)
+        result[short] = _votes(tracks, short, distance, near, result, unit)
     return result
+
+
+def _neighbours(
+    tracks: Tracks, short: NDArray[np.int64], usable: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Who is near each short track in the middle of its life: distances (S, N) and indices (S, N) of usable
+    tracks; at infinite distances where there are fewer."""
+    visible = tracks.visible[:, short]
+    middle = np.argmax(np.cumsum(visible, axis=0) > visible.sum(axis=0) // 2, axis=0)
+    distance = np.full((len(short), _NEIGHBOURS), np.inf)
+    near = np.full(distance.shape, usable[0])
+    for frame in np.unique(middle).tolist():
+        there, asked = usable[tracks.visible[frame, usable]], middle == frame
+        if len(there):
+            tree = cKDTree(tracks.xy[frame, there])
+            distance[asked], index = tree.query(tracks.xy[frame, short[asked]], k=_NEIGHBOURS)
+            near[asked] = there[np.minimum(index, len(there) - 1)]
+    return distance, near
 
 
 def follow_all_round(tracks: Tracks, labels: NDArray[np.int64], unit: float) -> NDArray[np.int64]:
@@ -227,23 +241,23 @@ def _in_one_quarter(to_neighbours: NDArray[np.float64]) -> Bools:
 
 def _votes(
     tracks: Tracks,
-    group: NDArray[np.int64],
-    frame: int,
-    usable: NDArray[np.int64],
+    short: NDArray[np.int64],
+    distance: NDArray[np.float64],
+    near: NDArray[np.int64],
     labels: NDArray[np.int64],
     unit: float,
 ) -> NDArray[np.int64]:
-    """Labels (G,) of short tracks, by the tracks that are usable in a frame: each near neighbour votes, the
-    more the nearer and the more alike it moves."""
-    distance, index = cKDTree(tracks.xy[frame, usable]).query(
-        tracks.xy[frame, group], k=min(_NEIGHBOURS, len(usable))
-    )
-    distance, near = (np.reshape(one, (len(group), -1)) for one in (distance, usable[index]))
-    both = tracks.visible[:, group, None] & tracks.visible[:, near]
+    """Labels (S,) of short tracks, by their neighbours (S, N): each votes, the more the nearer and the more
+    alike it moves."""
+    # Most live for a few frames: each of these by itself (L,), not all frames of the window.
+    track, frame = np.nonzero(tracks.visible[:, short].T)
+    first = np.searchsorted(track, np.arange(len(short)))
+    own, others = tracks.xy[frame, short[track]], near[track]
+    both = tracks.visible[frame[:, None], others]
     # Rigid neighbours keep their offset; perspective changes it in proportion to the way.
-    slip = _extent(tracks.xy[:, near] - tracks.xy[:, group, None], both)
-    slip[both.sum(axis=0) < 2] = np.inf
-    way = _extent(tracks.xy[:, group], tracks.visible[:, group])
+    slip = _extent(tracks.xy[frame[:, None], others] - own[:, None], both, first)
+    slip[np.add.reduceat(both, first, dtype=np.int64) < 2] = np.inf
+    way = _extent(own, np.ones(len(own), dtype=bool), first)
     least = slip.min(axis=1, keepdims=True)
     told = np.isfinite(least[:, 0])
     excess = np.full_like(slip, np.inf)
@@ -252,13 +266,14 @@ def _votes(
     # An object's label is carried neither far nor to what moves otherwise: that is seldom a part of it.
     far = (distance > _REACH * unit) | (excess > 1)
     weight[(labels[near] > BACKGROUND) & far] = 0.0
-    candidates = np.unique(labels[usable])
+    candidates = np.unique(labels[near])
     support = np.stack([np.where(labels[near] == c, weight, 0.0).sum(axis=1) for c in candidates], axis=1)
     return np.where(weight.any(axis=1), candidates[np.argmax(support, axis=1)], UNDECIDED)
 
 
-def _extent(xy: NDArray[np.float64], seen: Bools) -> NDArray[np.float64]:
-    """Diagonal of the box (...,) that each of the paths (F, ..., 2) fills where it is seen."""
-    low = np.where(seen[..., None], xy, np.inf).min(axis=0)
-    high = np.where(seen[..., None], xy, -np.inf).max(axis=0)
+def _extent(xy: NDArray[np.float64], seen: Bools, first: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Diagonal of the box (S, ...) that each of the paths fills where it is seen; their places (L, ..., 2)
+    one path after the other, each from its ``first`` (S,) on."""
+    low = np.minimum.reduceat(np.where(seen[..., None], xy, np.inf), first)
+    high = np.maximum.reduceat(np.where(seen[..., None], xy, -np.inf), first)
     return np.asarray(np.linalg.norm(np.where(high >= low, high - low, 0.0), axis=-1), np.float64)
