@@ -37,7 +37,10 @@ class TrackerConfig:
     """Least strength of any corner: RMS grey levels per pixel across the weaker direction. Noise with a
     standard deviation of 4 grey levels stays below it after Sobel's smoothing (factor sqrt(12) / 8)."""
     birth_interval: int = 3
-    """Frames between two searches for new corners; at 30 a second an empty place is filled within 0.1 s."""
+    """Most frames between two searches for new corners: what moves fast is lost within a few."""
+    birth_interval_s: float = 0.1
+    """Most seconds between them: at 10 frames a second every frame is searched. There a car that passes
+    loses a third of its points from one frame to the next, and would be bare for two more."""
     window: int = 11
     """Side of the KLT window, pixels, odd. OpenCV's 21 drags background along within 10 px of a moving edge;
     it can be compared by this setting and ``python -m ifsvideo.benchmark samples --config``."""
@@ -70,7 +73,15 @@ class TrackerConfig:
         for name in ("cells", "birth_interval", "check_interval"):
             if getattr(self, name) < 1:
                 raise UsageError(f"tracking.{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("crowding", "min_distance", "min_contrast", "max_return_error", "max_step", "max_drift"):
+        for name in (
+            "crowding",
+            "min_distance",
+            "min_contrast",
+            "birth_interval_s",
+            "max_return_error",
+            "max_step",
+            "max_drift",
+        ):
             if not getattr(self, name) > 0:
                 raise UsageError(f"tracking.{name} must be positive, got {getattr(self, name)}")
         for name in ("quality", "min_similarity", "min_resemblance", "margin"):

@@ -73,7 +73,7 @@ class Pipeline:
         renderer: Renderer | None = None,
     ) -> None:
         self.config = config or Config()
-        self.tracker: Tracker = tracker or KltTracker(self.config.tracking)
+        self.tracker = tracker
         self.segmenter: Segmenter = segmenter or IFSSegmenter(self.config.segmentation, self.config.seed)
         self.renderer: Renderer = renderer or OverlayRenderer(self.config.overlay)
 
@@ -194,8 +194,9 @@ class Pipeline:
             assert clip.trajectories is not None, "a clip has frames or trajectories"
             yield steps_of(clip.trajectories)
             return
+        tracker = self.tracker or KltTracker(self.config.tracking, float(clip.info.fps))
         pictures = watch.each("reading", clip.frames.pictures())
-        steps = watch.each("tracking", follow(self.tracker, pictures, mask, clip.frames.shot_frames))
+        steps = watch.each("tracking", follow(tracker, pictures, mask, clip.frames.shot_frames))
         with Ahead(steps, _AHEAD, clip.frames.stop) as ahead:
             yield watch.each("waiting", ahead)
 

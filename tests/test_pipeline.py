@@ -84,6 +84,14 @@ def test_a_stretch_counts_frames_from_0_and_keeps_the_time_of_the_input(pipeline
     assert (tmp_path / "o.csv").read_text().splitlines()[1].startswith("0,0.5000,")
 
 
+def test_the_tracker_knows_the_rate(pipeline, clip):
+    """At 10 frames a second it looks for new corners in every frame, at 30 in every third."""
+    slow, fast = (pipeline.run(clip, fps=fps).table for fps in (10, 30))
+    assert len(np.unique(slow.ids)) > len(np.unique(fast.ids))
+    first = np.array([fast.frame[fast.ids == track].min() for track in np.unique(fast.ids)])
+    assert (first % 3 == 0).all()
+
+
 def test_ignored_places_hold_no_points(pipeline, clip, tmp_path):
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[:, 120:] = True

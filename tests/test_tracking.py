@@ -189,6 +189,15 @@ def test_an_emptied_place_fills_again() -> None:
     assert max(len(item.ids) for item in points) == 300, "those of fuller places made room"
 
 
+@pytest.mark.parametrize(("fps", "every"), [(1, 1), (10, 1), (15, 2), (25, 3), (None, 3), (120, 3)])
+def test_what_comes_into_view_has_points_within_a_tenth_of_a_second(fps: float | None, every: int) -> None:
+    plane = texture(2 * WIDTH, HEIGHT, 14)
+    frames = [picture(plane[:, 16 * f : 16 * f + WIDTH]) for f in range(10)]
+    points = list(KltTracker(TrackerConfig(max_points=300), fps).track(frames))
+    newest = [int(item.ids.max()) for item in points]
+    assert [f for f in range(1, 10) if newest[f] > newest[f - 1]] == list(range(every, 10, every))
+
+
 def test_ignored_places_bear_no_points_and_end_those_that_come() -> None:
     plane = texture(2 * WIDTH, HEIGHT, 6)
     frames = [picture(plane[:, 6 * f : 6 * f + WIDTH]) for f in range(12)]
@@ -296,7 +305,14 @@ def test_drift_check_measures_the_offset_and_sees_another_surface() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"max_points": 0}, {"window": 20}, {"cells": 0}, {"max_return_error": 0.0}, {"quality": 1.0}],
+    [
+        {"max_points": 0},
+        {"window": 20},
+        {"birth_interval_s": 0.0},
+        {"cells": 0},
+        {"max_return_error": 0.0},
+        {"quality": 1.0},
+    ],
 )
 def test_configuration_out_of_range_is_refused(change: dict[str, Any]) -> None:
     with pytest.raises(UsageError, match=f"tracking.{next(iter(change))}"):

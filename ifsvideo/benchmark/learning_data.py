@@ -96,7 +96,7 @@ def _windows_of_clip(clip: _Clip) -> list[LabelledSequence]:
     source = open_source(clip.video)
     info = source.info
     with closing(source.frames()) as frames:
-        points = KltTracker(clip.config.tracking).track(frames)
+        points = KltTracker(clip.config.tracking, float(info.fps)).track(frames)
         found = Trajectories.collect(points, (info.width, info.height), float(info.fps))
     table = LabelTable(found.frame, found.ids, found.xy, np.zeros(len(found.ids), np.int32), found.frames)
     try:

@@ -51,10 +51,16 @@ class KltTracker:
     Parameters
     ----------
     config : TrackerConfig, optional
+    fps : float, optional
+        Frames a second; 30 where nobody told.
     """
 
-    def __init__(self, config: TrackerConfig | None = None) -> None:
+    def __init__(self, config: TrackerConfig | None = None, fps: float | None = None) -> None:
         self.config = config or TrackerConfig()
+        self.birth_interval = min(
+            self.config.birth_interval, max(1, int(self.config.birth_interval_s * (fps or 30.0) + 0.5))
+        )
+        """Frames between two searches for new corners."""
 
     def track(self, frames: Iterable[Image], ignore: Bools | None = None) -> Iterator[FramePoints]:
         """Yield the points of every frame, ordered by id: exactly one item per frame.
@@ -77,20 +83,23 @@ class KltTracker:
         life: _Life | None = None
         for frame in frames:
             if life is None:
-                life = _Life(frame.shape[1], frame.shape[0], ignore, self.config)
+                life = _Life(frame.shape[1], frame.shape[0], ignore, self.config, self.birth_interval)
             yield life.advance(frame)
 
 
 class _Life:
     """The living tracks of one clip, and the frame in which they were last seen."""
 
-    def __init__(self, width: int, height: int, ignore: Bools | None, config: TrackerConfig) -> None:
+    def __init__(
+        self, width: int, height: int, ignore: Bools | None, config: TrackerConfig, birth_interval: int
+    ) -> None:
         if ignore is not None and ignore.shape != (height, width):
             raise UsageError(
                 f"the ignore mask is {ignore.shape[1]}x{ignore.shape[0]}, the frames are {width}x{height}; "
                 "give a mask of the frames' size"
             )
         self.config = config
+        self.birth_interval = birth_interval
         self.width, self.height = tracked_size(width, height, config.scale)
         self.full_size = (width, height)
         self.diagonal = math.hypot(self.width, self.height)
@@ -111,7 +120,7 @@ class _Life:
             if self.previous is not None:
                 self._live(self.previous, grey)
             few = len(self.ids) < (1 - SUDDEN_LOSS) * self.after_birth
-            if few or self.frame % self.config.birth_interval == 0:
+            if few or self.frame % self.birth_interval == 0:
                 self._bear(grey)
         self.previous = grey
         self.frame += 1
