@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ifsvideo.objects.standing_camera import add_movers, sure_of_added
+from ifsvideo.objects.standing_camera import add_movers, add_vanished, sure_of_added
 from ifsvideo.types import Tracks
 from tests.scenes import SIZE, Camera, Mover, Scene, make_scene
 
@@ -70,6 +70,39 @@ def test_a_small_background_tells_nothing() -> None:
     assert told(scene, np.full(scene.tracks.points, -1)).tolist() == [-1] * scene.tracks.points
 
 
+@pytest.mark.parametrize(
+    ("camera", "frame", "away", "expected"),
+    [
+        (STANDS, 9, 0.0, 1),
+        (STANDS, 9, 60.0, -1),  # beside nothing that moves
+        (STANDS, 0, 0.0, -1),  # may have been there before
+        (STANDS, 19, 0.0, -1),  # may go on
+        (TURNS, 9, 0.0, -1),
+    ],
+    ids=["stands", "away", "first", "last", "turns"],
+)
+def test_what_is_lost_at_once_before_a_camera_that_stands_is_of_what_moves(
+    camera: Camera, frame: int, away: float, expected: int
+) -> None:
+    scene = make_scene(camera, (replace(WALKER, extent=(0.2, 0.4, 0.3)),), static=300)
+    walker = scene.truth == 1
+    seen_once = np.full((20, 1, 2), np.nan)
+    seen_once[frame, 0] = scene.tracks.xy[frame, walker].mean(axis=0) + np.array([away, 0.0])
+    tracks = Tracks.from_array(np.concatenate([scene.tracks.xy, seen_once], axis=1), size=SIZE)
+    labels = np.append(walker.astype(np.int64), -1)
+    told = add_vanished(tracks, np.arange(len(walker)), labels, 1.0)
+    assert told.tolist() == [*labels[:-1].tolist(), expected]
+
+
+def test_what_is_lost_at_once_tells_nothing_before_a_small_background() -> None:
+    scene = make_scene(STANDS, (WALKER,), static=30)
+    seen_once = np.full((20, 1, 2), np.nan)
+    seen_once[9] = scene.tracks.xy[9, scene.truth == 1][:1]
+    tracks = Tracks.from_array(np.concatenate([scene.tracks.xy, seen_once], axis=1), size=SIZE)
+    labels = np.append((scene.truth == 1).astype(np.int64), -1)
+    assert add_vanished(tracks, np.arange(len(scene.truth)), labels, 1.0)[-1] == -1
+
+
 def test_many_tracks_are_surer_than_few() -> None:
     labels = np.array([0, 1, 1, 2, 2, 2, 2, 3])
     sure = sure_of_added(labels, np.arange(8) > 0)
@@ -80,4 +113,5 @@ def test_many_tracks_are_surer_than_few() -> None:
 
 def test_no_tracks() -> None:
     none = np.empty(0, np.int64)
-    assert add_movers(Tracks.from_array(np.empty((5, 0, 2))), none, none, 1.0).shape == (0,)
+    for add in (add_movers, add_vanished):
+        assert add(Tracks.from_array(np.empty((5, 0, 2))), none, none, 1.0).shape == (0,)

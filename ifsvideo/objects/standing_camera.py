@@ -3,6 +3,10 @@
 Where the camera stands, or only turns, the static world has no parallax: from one frame to the next all of it
 follows one homography, and a track that departs from that moves, be it short or alone. Where the camera goes
 somewhere, near things depart from any homography, too, and nothing can be told this way.
+
+Where it stands, what is static does not even change its looks: a corner that is lost in the frame after its
+birth, beside a moving thing, lies on that or is a trace of it. Before a camera that turns it may as well be
+one of the world, smeared by the motion.
 """
 
 from __future__ import annotations
@@ -11,9 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ifsvideo.types import BACKGROUND, Bools, Tracks
+from ifsvideo.types import BACKGROUND, UNDECIDED, Bools, Tracks
 
 Array = NDArray[np.float64]
 
@@ -85,6 +90,37 @@ def add_movers(
     return result
 
 
+def add_vanished(
+    tracks: Tracks, decided: NDArray[np.int64], labels: NDArray[np.int64], unit: float
+) -> NDArray[np.int64]:
+    """Labels of a window, with the undecided tracks that are lost at once where something moves.
+
+    Parameters
+    ----------
+    tracks, decided, labels, unit : as of `add_movers`
+
+    Returns
+    -------
+    (P,) int
+        Unchanged unless the camera stands. Then an undecided track that is seen in one frame, neither the
+        window's first nor its last, has the label of the nearest moving track, if one is near.
+    """
+    seen = tracks.visible
+    once = (seen.sum(axis=0) == 1) & ~seen[0] & ~seen[-1] & (labels == UNDECIDED)
+    ground = decided[labels[decided] == BACKGROUND]
+    if not once.any() or not _stands(tracks, ground, unit):
+        return labels
+    result = labels.copy()
+    for frame in np.flatnonzero(seen[:, once].any(axis=1)).tolist():
+        asked, moving = (np.flatnonzero(seen[frame] & some) for some in (once, labels > BACKGROUND))
+        if not len(moving):
+            continue
+        distance, nearest = cKDTree(tracks.xy[frame, moving]).query(tracks.xy[frame, asked])
+        near = np.asarray(distance) <= _NEAR * unit
+        result[asked[near]] = labels[moving[np.asarray(nearest)[near]]]
+    return result
+
+
 def sure_of_added(labels: NDArray[np.int64], added: Bools) -> Array:
     """How sure `add_movers` is of the labels (P,) of the tracks that it added (P,), 0 for all others.
 
@@ -94,6 +130,16 @@ def sure_of_added(labels: NDArray[np.int64], added: Bools) -> Array:
     _, thing, count = np.unique(labels[added], return_inverse=True, return_counts=True)
     sure[added] = (1 - _SLIPPED**count)[thing]
     return sure
+
+
+def _stands(tracks: Tracks, ground: NDArray[np.int64], unit: float) -> bool:
+    """Whether the background stays where it is; not where it is too small to tell."""
+    if len(ground) < _LEAST_GROUND:
+        return False
+    xy = tracks.xy[:, ground]
+    first = xy[np.argmax(tracks.visible[:, ground], axis=0), np.arange(len(ground))]
+    farthest = np.nanmax(np.linalg.norm(xy - first, axis=2), axis=0)
+    return bool(np.mean(farthest <= _FITTING * unit) >= _LEAST_FITTING)
 
 
 def _departures(tracks: Tracks, ground: NDArray[np.int64], unit: float) -> Array | None:

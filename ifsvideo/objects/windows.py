@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ifsvideo.config import ObjectsConfig
-from ifsvideo.objects.standing_camera import add_movers, sure_of_added
+from ifsvideo.objects.standing_camera import add_movers, add_vanished, sure_of_added
 from ifsvideo.types import BACKGROUND, UNDECIDED, Bools, FramePoints, Segmenter, Tracks
 
 _REACH = 35.0
@@ -154,7 +154,8 @@ class WindowLabeller:
         if self.motions is None:
             labels = add_movers(tracks, lasting, followed, unit)
             confidence = np.maximum(confidence, sure_of_added(labels, labels != followed))
-        return WindowLabels(follow_all_round(tracks, labels, unit), confidence)
+        labels = follow_all_round(tracks, labels, unit)
+        return WindowLabels(add_vanished(tracks, lasting, labels, unit), confidence)
 
 
 def follow_neighbours(
