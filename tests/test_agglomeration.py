@@ -120,5 +120,14 @@ def test_apart_is_the_rule_on_the_measured_pair() -> None:
     scene = make_scene(movers=(LEFT_CAR,))
     merging = start(scene, rule(smaller_always=1.0))
     groups = merging.cues.groups(window(scene.truth).parts())
-    smaller = np.exp(merging.cues.between([(groups[0], groups[1])])[0, 2 + CUES.index("smaller")])
+    smaller = np.exp(merging.cues.between([(groups[0], groups[1])])[0, 4 + CUES.index("smaller")])
     assert merging.apart(groups[0], groups[1]) == pytest.approx(smaller / (1 + smaller))
+
+
+def test_what_is_merged_from_groups_is_what_is_merged_from_their_segments() -> None:
+    scene = make_scene(movers=(LEFT_CAR, RIGHT_CAR))
+    segments = window(cut(scene))
+    whole, parts = start(scene), start(scene)
+    expected = [sorted(group.members) for group in whole.run(segments)]
+    found = [sorted(group.members) for group in parts.merge(parts.cues.groups(segments.parts()))]
+    assert found == expected

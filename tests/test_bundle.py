@@ -184,3 +184,27 @@ def test_a_subset_is_the_same_window_with_fewer_points(aside: Scene) -> None:
     some = np.array([3, 5, 40])
     part = bundle.subset(some)
     assert_allclose(part.residual(replace(e, X=e.X[some])), bundle.residual(e)[..., some])
+
+
+@pytest.mark.parametrize("translate", [True, False])
+def test_what_is_left_without_places_is_the_misfit_after_points_found_their_best_ones(
+    aside: Scene, translate: bool
+) -> None:
+    """A small step of the cameras changes residuals as the derivatives say, once the points have followed."""
+    bundle = bundle_of(aside)
+    start = disturbed(true_estimate(aside))
+    if not translate:
+        start = replace(start, t=np.zeros_like(start.t), X=start.X * [1, 1, 0])
+    fitted = bundle.solve_points(start, 30)
+    if not translate:
+        fitted = replace(fitted, X=fitted.X * [1, 1, 0])
+    J, left = bundle.without_places(fitted, translate)
+    moved = replace(fitted, log_focal=fitted.log_focal + 1e-5)
+    _, after = bundle.without_places(moved, translate)
+    assert J.shape == (60, 2 * 6, 6 * 5 + 2)
+    assert_allclose((after - left) / 1e-5, J[:, :, -2], atol=2e-3)
+    # Nothing of it can be made up for by a point's own place.
+    derivatives = bundle._derivatives(fitted, bundle.project(fitted))[1]
+    own = derivatives.transpose(3, 0, 2, 1).reshape(60, 12, 3)[:, :, : 3 if translate else 2]
+    assert np.abs(own.transpose(0, 2, 1) @ J).max() < 1e-6
+    assert J[:, :, 3:6].any() == translate

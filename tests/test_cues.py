@@ -45,7 +45,7 @@ def measure(
 
 def cue(name: str, cues: Cues, a: Group, b: Group) -> float:
     """One of the cues between two groups, its logarithm undone."""
-    return float(np.exp(cues.between([(a, b)])[0, 2 + CUES.index(name)]))
+    return float(np.exp(cues.between([(a, b)])[0, 4 + CUES.index(name)]))
 
 
 def test_cross_prediction_is_small_inside_a_body_and_large_between_two() -> None:
@@ -96,7 +96,7 @@ def test_evidence_is_the_median_of_the_reliable_points() -> None:
     found = cues.groups([(np.arange(40), np.arange(10)), (np.arange(40, 60), np.arange(40, 60))])
     assert [group.evidence for group in found] == [3.0, 0.5]
     for pair in ((found[0], found[1]), (found[1], found[0])):
-        assert np.exp(cues.between([pair])[0, :2]) == pytest.approx([3.0, 0.5])
+        assert np.exp(cues.between([pair])[0, :4]) == pytest.approx([3.0, 0.5] * 2)  # no world that yields
         assert (cue("larger", cues, *pair), cue("smaller", cues, *pair)) == pytest.approx((20, 10))
 
 
@@ -113,7 +113,7 @@ def test_pairs_are_measured_together_as_by_themselves() -> None:
     cues, pieces = measure(bodies())
     pairs = [(pieces[0], pieces[1]), (pieces[1], pieces[3]), (pieces[2], pieces[3])]
     assert cues.between(pairs) == pytest.approx(np.concatenate([cues.between([pair]) for pair in pairs]))
-    assert cues.between([]).shape == (0, 2 + len(CUES))
+    assert cues.between([]).shape == (0, 4 + len(CUES))
 
 
 def test_a_larger_picture_of_the_same_measures_the_same() -> None:
@@ -199,7 +199,7 @@ def test_another_world_changes_evidence_and_depth_alone() -> None:
     for one in (moved, fresh):
         pieces = one.groups(parts)
         after = one.between([(pieces[0], pieces[2])])
-        unchanged = [2 + k for k, name in enumerate(CUES) if name != "depth"]
+        unchanged = [4 + k for k, name in enumerate(CUES) if name != "depth"]
         assert after[0, unchanged] == pytest.approx(before[0, unchanged])
-        assert not np.isclose(after[0, [0, 1, 2 + CUES.index("depth")]], before[0, [0, 1, -1]]).any()
+        assert not np.isclose(after[0, [0, 1, 4 + CUES.index("depth")]], before[0, [0, 1, -1]]).any()
     assert moved.between([(pieces[0], pieces[3])]) == pytest.approx(fresh.between([(pieces[0], pieces[3])]))

@@ -50,7 +50,7 @@ def staged(seed: int = 0, truth: np.ndarray | None = None) -> Staged:
 def drawn(count: int, rule: np.ndarray, seed: int) -> Pairs:
     """Pairs whose truth follows a known rule."""
     rng = np.random.default_rng(seed)
-    measured = rng.normal(0, 1, (count, 2 + len(CUES)))
+    measured = rng.normal(0, 1, (count, 4 + len(CUES)))
     apart = rng.random(count) < expit(features(measured) @ rule)
     return Pairs(measured, apart, rng.uniform(2, 50, count))
 
@@ -59,9 +59,9 @@ KNOWN = np.where(np.isin(feature_names(), ["constant", "rigid.always", "gap.if_b
 
 
 def test_pairs_of_one_motion_weigh_as_much_as_those_of_two() -> None:
-    pairs = Pairs(np.zeros((3, 10)), np.array([True, False, False]), np.array([5.0, 1.0, 10.0]))
+    pairs = Pairs(np.zeros((3, 12)), np.array([True, False, False]), np.array([5.0, 1.0, 10.0]))
     assert pairs.weights() == pytest.approx([0.5, 0.5 / (1 + 10**0.7), 0.5 * 10**0.7 / (1 + 10**0.7)])
-    alone = Pairs(np.zeros((2, 10)), np.array([True, True]), np.array([4.0, 4.0]))
+    alone = Pairs(np.zeros((2, 12)), np.array([True, True]), np.array([4.0, 4.0]))
     assert alone.weights() == pytest.approx([0.25, 0.25])
 
 
@@ -83,7 +83,7 @@ def test_sequences_count_by_their_importance() -> None:
 
 @pytest.mark.parametrize("apart", [[], [True, True], [False]])
 def test_both_kinds_of_pairs_are_needed(apart: list[bool]) -> None:
-    pairs = Pairs(np.zeros((len(apart), 10)), np.array(apart, dtype=bool), np.ones(len(apart)))
+    pairs = Pairs(np.zeros((len(apart), 12)), np.array(apart, dtype=bool), np.ones(len(apart)))
     with pytest.raises(InputError, match="too few sequences"):
         learning.fit([pairs], [1.0])
 
@@ -107,7 +107,7 @@ def test_the_oracle_measures_segments_and_what_they_grow_to() -> None:
     assert first < len(pairs.apart) <= first + PAIRS_PER_MERGE * segments
     assert pairs.apart.any()
     assert not pairs.apart.all()
-    assert pairs.measured.shape == (len(pairs.apart), 2 + len(CUES))
+    assert pairs.measured.shape == (len(pairs.apart), 4 + len(CUES))
     # The whole background against a whole car is met at the end.
     assert pairs.apart[-1]
     assert pairs.smaller[-1] >= 25

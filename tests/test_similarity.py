@@ -12,7 +12,7 @@ from scipy.special import expit
 from ifsvideo.segmentation.cues import CUES
 from ifsvideo.segmentation.similarity import WHEN, Similarity, feature_names, features, learnt
 
-MEASURED = np.random.default_rng(0).normal(0, 1, (5, 2 + len(CUES)))
+MEASURED = np.random.default_rng(0).normal(0, 1, (5, 4 + len(CUES)))
 FILE = tomllib.loads((files("ifsvideo.segmentation") / "similarity.toml").read_text(encoding="utf-8"))
 
 
@@ -23,20 +23,23 @@ def column(name: str) -> np.ndarray:
 def test_there_is_a_name_for_every_column() -> None:
     names = feature_names()
     assert features(MEASURED).shape == (5, len(names))
-    assert len(set(names)) == len(names) == 6 + 3 * len(CUES)
+    assert len(set(names)) == len(names) == 8 + 3 * len(CUES)
 
 
 def test_columns_are_what_their_names_say() -> None:
     larger, smaller = MEASURED[:, 0], MEASURED[:, 1]
-    one, both = expit(2 * larger), expit(2 * smaller)
+    larger_yielding, smaller_yielding = MEASURED[:, 2], MEASURED[:, 3]
+    one, both = expit(larger + larger_yielding), expit(smaller + smaller_yielding)
     assert column("constant") == pytest.approx(np.ones(5))
     assert column("larger_evidence") == pytest.approx(larger)
     assert column("smaller_evidence") == pytest.approx(smaller)
+    assert column("larger_yielding") == pytest.approx(larger_yielding)
+    assert column("smaller_yielding") == pytest.approx(smaller_yielding)
     assert column("one_moves") == pytest.approx(one)
     assert column("both_move") == pytest.approx(both)
     assert column("product") == pytest.approx(one * both)
     for place, cue in enumerate(CUES):
-        value = MEASURED[:, 2 + place]
+        value = MEASURED[:, 4 + place]
         assert column(f"{cue}.always") == pytest.approx(value)
         assert column(f"{cue}.if_one_moves") == pytest.approx(value * one)
         assert column(f"{cue}.if_both_move") == pytest.approx(value * both)
@@ -53,7 +56,7 @@ def test_the_file_holds_every_weight_and_no_other() -> None:
     assert FILE.keys() == {"core", "final"}
     for rule in FILE.values():
         assert rule.keys() == {"first", *CUES}
-        assert list(rule["first"]) == feature_names()[:6]
+        assert list(rule["first"]) == feature_names()[:8]
         assert all(tuple(rule[cue]) == WHEN for cue in CUES)
 
 
@@ -72,7 +75,7 @@ def measured(evidence: tuple[float, float], **ratios: float) -> np.ndarray:
     """One pair, plain numbers in place of logarithms."""
     usual = {"rigid": 1.0, "affine": 1.0, "shear": 0.1, "shear_ratio": 1.0, "gap": 20.0}
     values = usual | {"larger": 50.0, "smaller": 30.0, "depth": 0.3} | ratios
-    return np.log([[*evidence, *(values[cue] for cue in CUES)]])
+    return np.log([[*evidence, *evidence, *(values[cue] for cue in CUES)]])
 
 
 def test_the_rule_knows_clear_cases() -> None:

@@ -37,7 +37,7 @@ class Pairs:
 
     Attributes
     ----------
-    measured : (N, 2 + len(CUES)) float
+    measured : (N, 4 + len(CUES)) float
         As of `Cues.between`.
     apart : (N,) bool
         Whether the two are different motions.

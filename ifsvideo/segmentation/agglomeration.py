@@ -62,7 +62,11 @@ class Agglomeration:
     def run(self, window: Window, motions: int | None = None, stop: float = 0.5) -> list[Group]:
         """Merge segments until the best pair is two motions with probability ``stop``, or ``motions`` are
         left."""
-        groups = dict(enumerate(self.cues.groups(window.parts())))
+        return self.merge(self.cues.groups(window.parts()), motions, stop)
+
+    def merge(self, parts: list[Group], motions: int | None = None, stop: float = 0.5) -> list[Group]:
+        """The same from groups that were measured already."""
+        groups = dict(enumerate(parts))
         apart = self._apart(groups, [(i, j) for i in groups for j in groups if i < j])
         following = len(groups)
         while apart:

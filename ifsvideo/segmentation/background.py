@@ -49,10 +49,8 @@ def merge_and_label(
     for group in groups:
         parts = [group]
         if motions is None:
-            reliable = np.zeros(len(segments), dtype=bool)
-            reliable[group.reliable] = True
-            pieces = _pieces(group.members, cues.anchor, config.gap * cues.unit)
-            parts = [_measured(merging, piece, reliable) for piece in pieces]
+            parts = _pieces(merging, group, config.gap * cues.unit)
+        believed = []
         for part in parts:
             apart, count = merging.apart(part, still), len(part.members)
             doubt = config.few_points_doubt / count * min(1.0, _FEW / count)
@@ -61,7 +59,10 @@ def merge_and_label(
                 confidence[part.members] = 1 - apart
             else:
                 confidence[part.members] = apart
-                things.append(part.members)
+                believed.append(part)
+        # What is a thing by itself may yet be one with another part: a lorry and its trailer.
+        together = Agglomeration(cues, merging.similarity).merge(believed, stop=config.gap_doubt)
+        things += [np.sort(thing.members) for thing in together]
     for number, members in enumerate(sorted(things, key=lambda m: (-len(m), int(m[0]))), 1):
         labels[members] = number
     return labels, confidence
@@ -73,18 +74,19 @@ def static_group(groups: list[Group], anchor: NDArray[np.float64], size: tuple[i
     return int(np.argmax(claims))
 
 
-def _pieces(members: Members, anchor: NDArray[np.float64], gap: float) -> list[Members]:
+def _pieces(merging: Agglomeration, group: Group, gap: float) -> list[Group]:
     """Parts of a group that lie farther than ``gap`` from each other."""
+    members, cues = group.members, merging.cues
     if len(members) < 2:
-        return [members]
-    piece = fcluster(linkage(anchor[members], "single"), gap, "distance")
-    return [np.sort(members[piece == number]) for number in np.unique(piece)]
-
-
-def _measured(merging: Agglomeration, members: Members, reliable: NDArray[np.bool_]) -> Group:
-    """A part of a group as a group of its own."""
-    own = members[reliable[members]]
-    return merging.cues.group(members, own if len(own) >= 2 else members)
+        return [group]
+    piece = fcluster(linkage(cues.anchor[members], "single"), gap, "distance")
+    if piece.max() == 1:
+        return [group]
+    parts = [np.sort(members[piece == number]) for number in np.unique(piece)]
+    reliable = [part[np.isin(part, group.reliable)] for part in parts]
+    return [
+        cues.group(part, own if len(own) >= 2 else part) for part, own in zip(parts, reliable, strict=True)
+    ]
 
 
 def _spread(anchor: NDArray[np.float64], size: tuple[int, int]) -> int:

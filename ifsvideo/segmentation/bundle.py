@@ -177,8 +177,8 @@ class Bundle:
                 break
         return e
 
-    def solve_points(self, e: Estimate, iterations: int) -> Estimate:
-        """Points alone, each by itself, cameras fixed."""
+    def solve_points(self, e: Estimate, iterations: int, nearest: float = np.inf) -> Estimate:
+        """Points alone, each by itself, none with an inverse depth over ``nearest``; cameras fixed."""
         damping = np.full(len(e.X), 1e-3)
         seen = self.project(e)
         residual = self._missed(seen)
@@ -190,12 +190,13 @@ class Bundle:
             for axis in range(3):
                 V[axis, axis] += damping * V[axis, axis] + 1e-9
             X = e.X - Triangles(V).solve(g).T
-            behind = X[:, 2] < 0
-            if behind.any():
-                # At the bound the bearing moves with rho held at 0.
-                pull = g[:2, behind] - V[:2, 2, behind] * e.X[behind, 2]
-                X[behind, :2] = e.X[behind, :2] - Triangles(V[:2, :2, behind]).solve(pull).T
-                X[behind, 2] = 0.0
+            held = np.clip(X[:, 2], 0.0, nearest)
+            beyond = held != X[:, 2]
+            if beyond.any():
+                # At a bound the bearing moves with rho held there.
+                pull = g[:2, beyond] + V[:2, 2, beyond] * (held - e.X[:, 2])[beyond]
+                X[beyond, :2] = e.X[beyond, :2] - Triangles(V[:2, :2, beyond]).solve(pull).T
+                X[:, 2] = held
             moved = replace(e, X=X)
             seen_then = self.project(moved)
             new = self._missed(seen_then)
@@ -207,6 +208,34 @@ class Bundle:
             cost = np.where(better, square, cost)
             damping = np.where(better, damping / 10, damping * 10)
         return e
+
+    def without_places(self, e: Estimate, translate: bool) -> tuple[Array, Array]:
+        """Derivatives by cameras and lens (P, 2K, 6 (K - 1) + 2) and residuals (P, 2K) of each point, what
+        its own place can make up for taken off.
+
+        ``translate=False``: the cameras only turn, all points are far.
+        """
+        p = self.project(e)
+        J, own = self._derivatives(e, p)
+        if not translate:
+            J[:, 3:6] = 0.0
+            own[:, 2] = 0.0
+        residual = self._missed(p)
+        # A point that is held at infinity cannot go farther.
+        farther = np.einsum("kip,kip->p", own[:, 2], residual) > 0
+        own[:, 2, :, (e.X[:, 2] <= 0) & farther] = 0.0
+        shared = 6 * len(self._free)
+        rows: Array = np.zeros((len(e.X), len(J), 2, shared + _GLOBALS + 1))
+        for column, k in enumerate(self._free):
+            rows[:, k, :, 6 * column : 6 * column + 6] = J[k, :6].T
+        rows[..., shared:-1] = J[:, 6:].transpose(3, 0, 2, 1)
+        rows[..., -1] = residual.transpose(2, 0, 1)
+        rows = rows.reshape(len(e.X), 2 * len(J), -1)
+        place = own.transpose(3, 0, 2, 1).reshape(len(rows), -1, 3)
+        V = place.transpose(0, 2, 1) @ place
+        V += (1e-9 * np.einsum("paa->p", V) + 1e-12)[:, None, None] * np.eye(3)
+        rows -= place @ np.linalg.solve(V, place.transpose(0, 2, 1) @ rows)
+        return rows[..., :-1], rows[..., -1]
 
     def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array]:
         """Derivatives of the projections by camera (rotation, place) and lens (K, 8, 2, P), and by point

@@ -93,6 +93,9 @@ class SegmenterConfig:
     gap: float = 50.0
     """Distance at which what moves alike is several things, pixels: no part of a car is so far from the next.
     Faults of tracking are spread over the picture, and each is then judged by itself."""
+    gap_doubt: float = 0.3
+    """Probability of being two motions up to which parts that a gap cut are one thing all the same, if each
+    is believed to move: a lorry and its trailer."""
 
     def __post_init__(self) -> None:
         for name, values in (("split", ("world", "epipolar")), ("merging", ("evidence", "shear"))):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.segmentation import shear
+from ifsvideo.segmentation.leeway import Leeway
 from ifsvideo.segmentation.lowrank import Subspace, trajectory_matrix
 from ifsvideo.types import Tracks
 
@@ -57,6 +58,8 @@ class Group:
     sample : (n'',) int, those of them that are measured
     evidence : float
         Median distance of the reliable points from a static point's way; above 1 speaks for motion.
+    yielding : float
+        The same after the cameras gave way to them (`ifsvideo.segmentation.leeway`), at most as much.
     depth : (3,) float, nearness below which a tenth, half and nine tenths of the reliable points lie
     inside : float, shear inside it, NaN where it has no edge
     rigid, affine : (P,) float, distance of every point from its rank-3 and rank-2 subspace, pixels
@@ -66,6 +69,7 @@ class Group:
     reliable: Members
     sample: Members
     evidence: float
+    yielding: float
     depth: Array
     inside: float
     rigid: Array
@@ -95,17 +99,20 @@ class Cues:
         self.evidence, self.nearness = evidence, nearness
         self.W, self.seen = trajectory_matrix(tracks, _KEY_FRAMES)
         self.noise = self.typical_inside = 0.0
+        self.leeway: Leeway | None = None
         self._groups: dict[bytes, Group] = {}
+        self._worldly: dict[bytes, tuple[float, float, Array]] = {}
         self._pairs: dict[tuple[bytes, bytes], list[float]] = {}
 
     def __getstate__(self) -> dict[str, object]:
         """Without what was kept only to be fast."""
-        return self.__dict__ | {"_groups": {}, "_pairs": {}}
+        return self.__dict__ | {"_groups": {}, "_pairs": {}, "_worldly": {}}
 
-    def in_world(self, evidence: Array, nearness: Array) -> Cues:
+    def in_world(self, evidence: Array, nearness: Array, leeway: Leeway | None = None) -> Cues:
         """The same window in another static world: what groups were measured for by then is kept."""
         other = copy(self)
-        other.evidence, other.nearness = evidence, nearness
+        other.evidence, other.nearness, other.leeway = evidence, nearness, leeway
+        other._worldly = {}
         other._groups, other._pairs = self._groups, self._pairs  # copy, like pickle, leaves them out
         return other
 
@@ -126,10 +133,16 @@ class Cues:
         key = reliable.tobytes()
         if key not in self._groups:
             self._groups[key] = self._measured(members, reliable)
-        depth = _deciles(self.nearness[reliable])
-        return replace(
-            self._groups[key], members=members, evidence=_median(self.evidence[reliable]), depth=depth
-        )
+        if key not in self._worldly:
+            self._worldly[key] = self._in_this_world(reliable, self._groups[key].sample)
+        evidence, yielding, depth = self._worldly[key]
+        return replace(self._groups[key], members=members, evidence=evidence, yielding=yielding, depth=depth)
+
+    def _in_this_world(self, reliable: Members, sample: Members) -> tuple[float, float, Array]:
+        """Both evidences and the depth of a group."""
+        evidence = _median(self.evidence[reliable])
+        yielding = evidence if self.leeway is None else self.leeway.evidence(sample)
+        return evidence, yielding, _deciles(self.nearness[reliable])
 
     def _measured(self, members: Members, reliable: Members) -> Group:
         """What does not depend on the static world."""
@@ -138,20 +151,21 @@ class Cues:
         space = Subspace.fit(W, seen, 3)
         rigid, affine = (each.distance(self.W, self.seen) for each in (space, space.main(W, seen, 2)))
         inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
-        return Group(members, reliable, sample, 0.0, np.zeros(3), inside, rigid, affine)
+        return Group(members, reliable, sample, 0.0, 0.0, np.zeros(3), inside, rigid, affine)
 
     def merge(self, a: Group, b: Group) -> Group:
         """Both as one."""
         return self.group(np.concatenate([a.members, b.members]), np.concatenate([a.reliable, b.reliable]))
 
     def between(self, pairs: list[tuple[Group, Group]]) -> Array:
-        """Measurements (N, 2 + len(CUES)) of pairs of groups: larger and smaller evidence, then `CUES`."""
+        """Measurements (N, 4 + len(CUES)) of pairs of groups: larger and smaller evidence, the same after the
+        cameras gave way, then `CUES`."""
         if not pairs:
-            return np.empty((0, 2 + len(CUES)))
+            return np.empty((0, 4 + len(CUES)))
         keys = [(a.reliable.tobytes(), b.reliable.tobytes()) for a, b in pairs]
         self._measure({key: pair for key, pair in zip(keys, pairs, strict=True) if key not in self._pairs})
         values = [
-            [max(a.evidence, b.evidence), min(a.evidence, b.evidence), *self._pairs[key], _depth(a, b)]
+            [*_both(a.evidence, b.evidence), *_both(a.yielding, b.yielding), *self._pairs[key], _depth(a, b)]
             for key, (a, b) in zip(keys, pairs, strict=True)
         ]
         return np.asarray(np.log(np.maximum(np.array(values), 1e-3)))
@@ -191,6 +205,11 @@ class Cues:
             len(large.reliable),
             len(small.reliable),
         ]
+
+
+def _both(a: float, b: float) -> tuple[float, float]:
+    """The larger one first."""
+    return (a, b) if a > b else (b, a)
 
 
 def _depth(a: Group, b: Group) -> float:

@@ -26,21 +26,22 @@ Two static ones at different depths shear against each other; two that move do n
 
 
 def features(measured: Array) -> Array:
-    """What the rule weighs (N, 6 + 3 len(CUES)), from the columns of
+    """What the rule weighs (N, 8 + 3 len(CUES)), from the columns of
     `ifsvideo.segmentation.cues.Cues.between`.
 
-    A constant, both evidences, the probabilities that one moves and that both do, their product, and every
-    cue by itself and times either probability.
+    A constant, both evidences, both after the cameras gave way, the probabilities that one moves and that
+    both do, their product, and every cue by itself and times either probability.
     """
-    evidence, cues = measured[:, :2], measured[:, 2:]
-    moves = expit(2 * evidence)  # e^2 / (1 + e^2) of the evidence e
-    first = [np.ones((len(measured), 1)), evidence, moves, moves.prod(axis=1, keepdims=True)]
+    evidence, yielding, cues = measured[:, :2], measured[:, 2:4], measured[:, 4:]
+    moves = expit(evidence + yielding)  # e^2 / (1 + e^2) of e, the geometric mean of both evidences
+    first = [np.ones((len(measured), 1)), evidence, yielding, moves, moves.prod(axis=1, keepdims=True)]
     return np.hstack([*first, cues, cues * moves[:, :1], cues * moves[:, 1:]])
 
 
 def feature_names() -> list[str]:
     """Names of the columns of `features`."""
-    first = ["constant", "larger_evidence", "smaller_evidence", "one_moves", "both_move", "product"]
+    first = ["constant", "larger_evidence", "smaller_evidence", "larger_yielding", "smaller_yielding"]
+    first += ["one_moves", "both_move", "product"]
     return first + [f"{cue}.{when}" for when in WHEN for cue in CUES]
 
 
@@ -50,7 +51,7 @@ class Similarity:
 
     Attributes
     ----------
-    weights : (6 + 3 len(CUES),) float
+    weights : (8 + 3 len(CUES),) float
         As the columns of `features`.
     """
 

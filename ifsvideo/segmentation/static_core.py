@@ -12,6 +12,7 @@ from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.background import static_group
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import Cues
+from ifsvideo.segmentation.leeway import Leeway
 from ifsvideo.segmentation.similarity import Similarity
 from ifsvideo.segmentation.world import World
 
@@ -38,4 +39,5 @@ def in_static_core(
     groups = Agglomeration(cues, rule).run(window, stop=config.core_doubt)
     core = groups[static_group(groups, cues.anchor, window.size)].reliable
     own = world.fitted_to(core)
-    return cues.in_world(own.evidence(config.evidence_threshold), own.nearness)
+    leeway = Leeway(own, core, config.evidence_threshold) if own is not world else None
+    return cues.in_world(own.evidence(config.evidence_threshold), own.nearness, leeway)

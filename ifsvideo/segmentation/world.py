@@ -48,8 +48,18 @@ FINALISTS, FINAL_STEPS = 3, 8
 """Starts that are followed to their end, and the steps of each: of two, both are sometimes wrong."""
 LAST_STEPS = 3
 """Steps with all points, from what the few of the starts found."""
+PARALLAX_GAIN = 0.6
+"""A camera has moved, too, if points that are surely static then fit so many times better: nothing that moves
+can feign it there. A point's further unknown alone gains a thirtieth."""
+NEAREST = 3.0
+"""Nothing is so many times nearer than nearly all that is static, where the camera's way is slight: at a
+hundred times their nearness whatever crosses the view would stand still."""
+SLIGHT = 0.003
+"""Nearness from which that fit starts: what is nearer has shown that the camera moved."""
 REFIT = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0]
 """Widths of the steps by which a world is fitted to a part of the points."""
+SET_OFF = [4.0, 2.0, 2.0, 1.0, 1.0, 1.0]
+"""The same where the camera is to move for the first time."""
 REFIT_POINTS = 250
 """Points by which the cameras are fitted then, at most; more tell nothing new."""
 LEAST_POINTS = 8
@@ -111,10 +121,19 @@ class World:
         shutter behind a wide lens is granted more than a benchmark's, and so are places that lie far from
         the points to which the world was fitted. Above 1 speaks for motion; 0 where nothing can be said.
         """
+        return np.nan_to_num(self.rms / self.tolerance) / (threshold * self.usual)
+
+    @cached_property
+    def usual(self) -> float:
+        """The usual error of a point that the world explains, in tolerances."""
         error = np.nan_to_num(self.rms / self.tolerance)
         explained = error[(error > 0) & (error < 2)]
-        usual = max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
-        return error / (threshold * usual)
+        return max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
+
+    def without_places(self) -> tuple[Array, Array]:
+        """Derivatives of the projections by cameras and lens (P, 2K, N) and residuals (P, 2K), normalised,
+        what each point's own place can make up for taken off."""
+        return self.bundle.without_places(self.estimate, self.has_moved)
 
     def fitted_to(self, points: NDArray[np.int64]) -> World:
         """The world of some points that are surely static, and where all others are in it.
@@ -125,15 +144,22 @@ class World:
         if len(points) < LEAST_POINTS:
             return self
         few = points[:: 1 + (len(points) - 1) // REFIT_POINTS]
-        before = self.estimate.X
-        own = self.bundle.subset(few).solve(
-            replace(self.estimate, X=before[few]), REFIT, translate=self.has_moved
-        )
-        X = before.copy()
-        # Only the product of depth and the camera's way is known; the others take the few's new scale.
-        X[:, 2] *= (own.X[:, 2] @ before[few, 2]) / max(float(before[few, 2] @ before[few, 2]), 1e-12)
+        before, bundle = self.estimate.X, self.bundle.subset(few)
+        own = bundle.solve(replace(self.estimate, X=before[few]), REFIT, translate=self.has_moved)
+        X, has_moved, nearest = before.copy(), self.has_moved, np.inf
+        if has_moved:
+            # Only the product of depth and the camera's way is known; the others take the few's new scale.
+            X[:, 2] *= (own.X[:, 2] @ before[few, 2]) / max(float(before[few, 2] @ before[few, 2]), 1e-12)
+        else:
+            moving = _set_off(bundle, own, self.frames)
+            has_moved = _typical(bundle, moving) < PARALLAX_GAIN * _typical(bundle, own)
+            if has_moved:
+                own = moving
+                X[:, 2] = np.median(own.X[:, 2])
+                nearest = NEAREST * float(np.percentile(own.X[:, 2], 95))
         X[few] = own.X
-        return replace(self, estimate=self.bundle.solve_points(replace(own, X=X), 6))
+        estimate = self.bundle.solve_points(replace(own, X=X), 6, nearest)
+        return replace(self, estimate=estimate, has_moved=has_moved)
 
 
 def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -> World | None:
@@ -219,6 +245,23 @@ def _has_moved(bundle: Bundle, moved: Estimate, far: Estimate) -> bool:
     cell = np.array([1, 100]) @ np.floor((place + 0.5) * PARALLAX_CELLS).astype(int)
     needing = np.unique(cell[(near & ~still)[counted]])
     return len(needing) >= PARALLAX_SHARE * len(np.unique(cell))
+
+
+def _set_off(bundle: Bundle, turned: Estimate, frames: NDArray[np.int64]) -> Estimate:
+    """The best camera that moves, from one that only turns: with constant speed in one of some directions at
+    first."""
+    time = (frames - frames[bundle.reference]) / max(frames[-1] - frames[0], 1)
+    X = np.column_stack([turned.X[:, :2], np.full(len(turned.X), SLIGHT)])
+    found = [
+        bundle.solve(replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=X), SET_OFF)
+        for direction in STARTS
+    ]
+    return min(found, key=lambda estimate: _typical(bundle, estimate))
+
+
+def _typical(bundle: Bundle, estimate: Estimate) -> float:
+    """Median over the points of their error, in tolerances."""
+    return float(np.median(bundle.rms(bundle.residual(estimate)) / bundle.tolerance))
 
 
 def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estimate]:
