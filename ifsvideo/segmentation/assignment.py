@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ifsvideo.segmentation.lowrank import along_mean_path
+from ifsvideo.segmentation.lowrank import along_mean_path, principal
 from ifsvideo.segmentation.sampling import AffineModels
 from ifsvideo.types import Bools, Tracks
 
@@ -58,8 +58,9 @@ def _subspace(
     """Mean trajectory and two left singular vectors, (2F,) each; missing entries filled along the mean."""
     W = along_mean_path(W, seen)
     mean = W.mean(axis=1) if centred else np.zeros(len(W))
-    U = np.linalg.svd(W - mean[:, None], full_matrices=False)[0]
-    return mean, U[:, 0], U[:, 1] if U.shape[1] > 1 else np.zeros(len(W))
+    main = principal(W - mean[:, None], 2)
+    u, v = (main / np.maximum(np.linalg.norm(main, axis=0), 1e-12)).T
+    return mean, u, v
 
 
 def assign(
