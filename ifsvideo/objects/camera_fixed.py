@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.types import Bools, FramePoints
 
-_SHAKE_TO_SPREAD = 6.0
+SHAKE_TO_SPREAD = 6.0
 """How many times the track's own spread the world must have shaken meanwhile."""
 _GRID = 8
 """Cells along a side of the picture; the world must be seen in many of them."""
@@ -105,7 +105,7 @@ class CameraFixed:
         found = []
         for k in np.flatnonzero(~np.isin(ids, self.ids)):
             shake = np.linalg.norm(np.ptp(path[begin[k] : end[k] + 1], axis=0))
-            enough = max(config.fixed_shake * unit, _SHAKE_TO_SPREAD * spread[k])
+            enough = max(config.fixed_shake * unit, SHAKE_TO_SPREAD * spread[k])
             if shake > enough and travelled[end[k]] - travelled[begin[k]] > config.fixed_travel * unit:
                 found.append(ids[k])
         self.ids = np.union1d(self.ids, np.array(found, np.int64))

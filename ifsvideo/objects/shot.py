@@ -15,6 +15,7 @@ from ifsvideo.objects.camera_fixed import CameraFixed
 from ifsvideo.objects.figure_ground import FigureGround
 from ifsvideo.objects.linking import Linker
 from ifsvideo.objects.numbering import Numbers
+from ifsvideo.objects.still_objects import still_objects
 from ifsvideo.objects.windows import Bounds, WindowLabels, Windows, WindowSize, gather, long_enough
 from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Tracks
 from ifsvideo.video.picture import Picture
@@ -107,6 +108,8 @@ class Shot:
         self._window_size = WindowSize.at(fps, config)
         self._windows = Windows(self._window_size)
         self._fixed = CameraFixed(size, fps, config)
+        self._still: set[int] = set()
+        """Objects that are fixed to the camera as a whole, as the linker numbers them."""
         self._borders = FigureGround(scale, fps)
         longest_loss = config.longest_loss_s * (fps or 30.0)
         self._linker = Linker(config.least_shared, config.least_windows, longest_loss)
@@ -195,6 +198,10 @@ class Shot:
         wanted = self._blocks.popleft() - self._gone
         on_ground = self._borders.on_ground(self._config.least_ground_misfit)
         labels = self._labels_now(known, on_ground)
+        unit = float(np.hypot(*self._size)) / 800 if self._size else 1.0
+        self._still |= still_objects([frame.points for frame in known], labels, unit, self._config)
+        for frame_labels in labels:
+            frame_labels[np.isin(frame_labels, list(self._still))] = UNDECIDED
         final = self._numbers.settle(labels, [frame.place for frame in known], wanted)
         for frame, own in zip(known, final, strict=False):
             frame.labels = own.astype(np.int64)
