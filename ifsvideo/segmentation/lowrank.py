@@ -88,14 +88,13 @@ class Subspace:
 
     def _coordinates(self, W: Array, seen: Array) -> Array:
         """Coordinates (rank, P) of the nearest points of the subspace."""
-        M, rank = self.directions, self.rank
-        left = ((M[:, :, None] * M[:, None]).reshape(len(M), rank**2).T @ seen).reshape(
-            rank, rank, W.shape[1]
-        )
-        ridge = 1e-6 * (np.einsum("aap->p", left) + 1e-9)
-        for axis in range(rank):
-            left[axis, axis] += ridge
-        return Triangles(left).solve(M.T @ W - (M * self.mean[:, None]).T @ seen)
+        M, rank, points = self.directions, self.rank, W.shape[1]
+        products = (M[:, :, None] * M[:, None]).reshape(len(M), rank**2)
+        sums = np.hstack([products, M * self.mean[:, None]]).T @ seen
+        left, means = sums[: rank**2].reshape(rank, rank, points), sums[rank**2 :]
+        diagonal = sums[: rank**2 : rank + 1]
+        diagonal += 1e-6 * (diagonal.sum(axis=0) + 1e-9)
+        return Triangles(left).solve(M.T @ W - means)
 
 
 def principal(X: Array, rank: int) -> Array:

@@ -25,12 +25,10 @@ def shear_and_stretch(
     shear, stretch : (F-1, E) float
         Absolute changes; NaN where an end is not seen in both frames.
     """
-    vector = tracks.xy[:, edges[:, 1]] - tracks.xy[:, edges[:, 0]]
-    length = np.linalg.norm(vector, axis=2)
-    before, after = vector[:-1], vector[1:]
-    cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    shear = np.abs(np.arctan2(cross, (before * after).sum(axis=2)))
-    return shear, np.abs(np.diff(length, axis=0))
+    x, y = np.moveaxis(tracks.xy[:, edges[:, 1]] - tracks.xy[:, edges[:, 0]], 2, 0)
+    cross = x[:-1] * y[1:] - y[:-1] * x[1:]
+    shear = np.abs(np.arctan2(cross, x[:-1] * x[1:] + y[:-1] * y[1:]))
+    return shear, np.abs(np.diff(np.sqrt(x * x + y * y), axis=0))
 
 
 def totals(tracks: Tracks, edges: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -17,11 +17,12 @@ class Triangles:
         self._L: list[list[Array]] = []
         for row in range(len(V)):
             L: list[Array] = []
-            for column in range(row):
-                above = self._L[column]
-                rest = V[row, column] - sum(x * y for x, y in zip(L, above, strict=False))
-                L.append(rest / above[column])
-            L.append(np.sqrt(V[row, row] - sum(x * x for x in L)))
+            for column in range(row + 1):
+                above = L if column == row else self._L[column]
+                rest = V[row, column]
+                for x, y in zip(L, above, strict=False):
+                    rest = rest - x * y
+                L.append(np.sqrt(rest) if column == row else rest / above[column])
             self._L.append(L)
 
     def halfway(self, right: Array) -> Array:
