@@ -159,10 +159,11 @@ class ObjectsConfig:
     least_windows: int = 2
     """Windows that must find an object, where the clip has so many: parallax and slipping corners that look
     like motion in one window seldom do so again in the next, which sees half of the same frames."""
-    least_confidence: float = 0.996
+    least_confidence: float = 0.99
     """How sure of an object one of these windows must be. In handheld_no_movers.mp4 and the rendered static
     drive (``python -m ifsvideo.benchmark static``) parallax at the picture's border and what windows mirror
-    reach 0.995; a car or a person is 0.999 as soon as it moves for a second."""
+    stay below; at 0.98 they no longer do. A car or a person is 0.999 as soon as it moves for a second, a van
+    of a dozen points far ahead 0.99."""
     alone_confidence: float = 0.9999
     """How sure a window must be if no other finds the object."""
     least_seconds: float = 0.5

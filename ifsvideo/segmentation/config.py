@@ -19,6 +19,10 @@ class SegmenterConfig:
     distortion: float = 0.0
     """k1 of the lens, taken out of the tracks before anything else (`ifsvideo.lens` has the model): above
     -4/27, negative for a wide lens. By default the lens bends nothing."""
+    smoothing: float = 10_000.0
+    """How much noisy tracks are smoothed (`ifsvideo.segmentation.smoothing`): not at all below a quarter of a
+    pixel of noise; at one pixel this holds back what changes within 30 frames. 0, the thesis's, smoothes
+    none."""
     split: Literal["world", "epipolar"] = "world"
     """Stage 1: ``epipolar`` is the thesis's (fundamental matrices against the first frame), ``world`` fits
     one rigid perspective scene to all frames at once, which also sees a point behind the camera or below the
@@ -134,6 +138,7 @@ class SegmenterConfig:
         start that its restatement proposes.
         """
         return cls(
+            smoothing=0.0,
             split="epipolar",
             models=60,
             through_centre=False,

@@ -20,6 +20,7 @@ from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
 from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
+from ifsvideo.segmentation.smoothing import smoothed
 from ifsvideo.segmentation.static_core import in_static_core
 from ifsvideo.segmentation.world import World, fit_world
 from ifsvideo.types import UNDECIDED, Segmentation, Tracks
@@ -73,6 +74,7 @@ class IFSSegmenter:
         if config.distortion:
             tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
         unit = float(np.hypot(*size)) / 800
+        tracks = smoothed(tracks, config.smoothing, unit)
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))

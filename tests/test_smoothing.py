@@ -1,0 +1,69 @@
+"""Smoothing: clean tracks stay as they are, noisy ones come nearer to the truth, and gaps stay gaps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.segmenter import IFSSegmenter
+from ifsvideo.segmentation.smoothing import noise_of, smoothed
+from ifsvideo.types import Tracks
+from tests.scenes import LEFT_CAR, RIGHT_CAR, Camera, Scene, make_scene, share_wrong
+
+STRENGTH = SegmenterConfig().smoothing
+
+
+def scene_of(noise: float, shake: float = 0.005, seed: int = 0) -> Scene:
+    camera = Camera.path(frames=30, step=(0.1, 0.0, 0.1), shake=shake)
+    return make_scene(camera, (LEFT_CAR, RIGHT_CAR), noise=noise, seed=seed)
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("shake", [0.0, 0.005])
+def test_noise_is_told_whatever_the_camera_does(noise: float, shake: float) -> None:
+    assert noise_of(scene_of(noise, shake).tracks) == pytest.approx(noise, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("noise", "strength", "unit"), [(0.1, STRENGTH, 1.0), (1.0, 0.0, 1.0), (1.0, 1e4, 8)]
+)
+def test_clean_tracks_stay_as_they_are(noise: float, strength: float, unit: float) -> None:
+    tracks = scene_of(noise).tracks
+    assert smoothed(tracks, strength, unit) is tracks
+
+
+@pytest.mark.parametrize("noise", [0.5, 1.0, 2.0])
+def test_noisy_tracks_come_nearer_to_the_truth(noise: float) -> None:
+    true, noisy = scene_of(0.0).tracks.xy, scene_of(noise).tracks
+    found = smoothed(noisy, STRENGTH, 1.0)
+    before, after = (np.sqrt(np.mean((xy - true) ** 2)) for xy in (noisy.xy, found.xy))
+    assert after < 0.6 * before
+
+
+def test_gaps_stay_gaps_and_short_tracks_are_left() -> None:
+    tracks = scene_of(1.0).with_gaps().tracks
+    visible = tracks.visible.copy()
+    short = int(np.argmax(visible[:2].all(axis=0)))
+    visible[2:, short] = False  # a point that is seen twice
+    xy = np.where(visible[..., None], tracks.xy, np.nan)
+    found = smoothed(replace(tracks, xy=xy, visible=visible), STRENGTH, 1.0)
+    assert np.array_equal(np.isfinite(found.xy).all(axis=2), visible)
+    assert found.xy[:2, short] == pytest.approx(xy[:2, short], abs=1e-3)
+
+
+def test_no_track_of_four_frames_has_no_noise() -> None:
+    tracks = Tracks.from_array(np.random.default_rng(0).uniform(0, 600, (3, 20, 2)), size=(640, 480))
+    assert noise_of(tracks) == 0
+    assert smoothed(tracks, STRENGTH, 1.0) is tracks
+
+
+def test_cars_are_found_among_noise_in_which_they_drown_otherwise() -> None:
+    wrong = {}
+    for strength in (0.0, STRENGTH):
+        segmenter = IFSSegmenter(SegmenterConfig(smoothing=strength))
+        scenes = [scene_of(1.5, seed=seed) for seed in range(4)]
+        wrong[strength] = np.mean([share_wrong(segmenter.segment(s.tracks).labels, s.truth) for s in scenes])
+    assert wrong[STRENGTH] < 0.5 * wrong[0.0]
