@@ -215,7 +215,7 @@ class Pipeline:
         with ExitStack() as stack:
             call: Callable[[Tracks], WindowLabels] = labeller
             if long and isinstance(self.segmenter, IFSSegmenter):
-                call = stack.enter_context(Worker(labeller, "segments"))
+                call = stack.enter_context(Worker(labeller, "segments", keeps_memory=True))
 
             def label(tracks: Tracks) -> WindowLabels:
                 with watch.stage("segmenting"):

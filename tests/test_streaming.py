@@ -307,6 +307,13 @@ def test_a_worker_calls_raises_and_ends_with_its_context() -> None:
         os.kill(pid, 0)
 
 
+@pytest.mark.parametrize("keeps", [True, False])
+def test_only_a_worker_that_is_told_so_keeps_memory(keeps: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MALLOC_TOP_PAD_", raising=False)
+    with Worker(os.getenv, "asks", keeps_memory=keeps) as worker:
+        assert (worker("MALLOC_TOP_PAD_") is not None) == keeps
+
+
 def test_a_worker_that_is_killed_is_one_line() -> None:
     with Worker(int, "counts") as worker:
         os.kill(worker.pid, signal.SIGKILL)

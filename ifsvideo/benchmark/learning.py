@@ -231,8 +231,9 @@ def as_toml(rules: Rules, command: str) -> str:
     """The file `similarity.toml`, which a comment says is made by ``command``."""
     lines = [
         "# How stage 5 weighs what it measures of two segments; more speaks for two motions. first: the",
-        "# constant, the logarithms of the larger and the smaller evidence of motion, the probabilities that",
-        "# one of the two moves and that both do, and their product. Every other section is a cue",
+        "# constant, the logarithms of the larger and the smaller evidence of motion, the same after the",
+        "# cameras gave way (ifsvideo/segmentation/leeway.py), the probabilities that one of the two",
+        "# moves and that both do, and their product. Every other section is a cue",
         "# (ifsvideo/segmentation/cues.py): its weight always, and what is added the surer one of the two",
         "# moves, or both do.",
         "#",
