@@ -27,6 +27,7 @@ from ifsvideo.errors import IfsVideoError
 from ifsvideo.pipeline import Pipeline
 from ifsvideo.summary import summary
 from ifsvideo.types import Progress, Result
+from ifsvideo.video.ffmpeg import kill_all
 
 _Value = TypeVar("_Value")
 
@@ -213,6 +214,7 @@ def _supervised(function: Callable[..., _Value], *arguments: Any, **named: Any) 
     try:
         return function(*arguments, **named)
     except _Stopped:
+        kill_all()  # those whose contexts were not entered yet
         os._exit(128 + signal.SIGTERM)  # all is cleaned up, and there may be no parent left to ask for more
     finally:
         _busy = False

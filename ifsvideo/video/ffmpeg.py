@@ -11,6 +11,7 @@ import threading
 import weakref
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future
 from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
@@ -61,14 +62,9 @@ class Ffmpeg:
         self, arguments: Sequence[str], *, feeds: bool = False, stdin: IO[bytes] | None = None
     ) -> None:
         command = [executable(), "-hide_banner", *([] if feeds or stdin else ["-nostdin"]), *arguments]
-        # A session of its own: Ctrl-C in the terminal reaches Python alone, which decides about the child.
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE if feeds else stdin or subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL if feeds else subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        )
+        stdin_of = subprocess.PIPE if feeds else stdin or subprocess.DEVNULL
+        self._process = _start(command, stdin_of, subprocess.DEVNULL if feeds else subprocess.PIPE)
+        _running.add(self)
         self._lines: deque[str] = deque(maxlen=_KEPT_LINES)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
@@ -128,6 +124,44 @@ class Ffmpeg:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+_running: weakref.WeakSet[Ffmpeg] = weakref.WeakSet()
+
+
+def kill_all() -> None:
+    """Kill all children: before a process ends at once, whose pipes would tell them to end their files."""
+    for child in list(_running):
+        child.kill()
+
+
+def _start(command: list[str], stdin: int | IO[bytes], stdout: int) -> subprocess.Popen[bytes]:
+    """Start a child in a thread: a signal's exception, which strikes the main one, then never strikes between
+    the child's beginning and our knowing of it, whose file would appear when all is cleaned up."""
+    begun: Future[subprocess.Popen[bytes]] = Future()
+
+    def start() -> None:
+        try:
+            # A session of its own: Ctrl-C in the terminal reaches Python alone, which decides.
+            begun.set_result(
+                subprocess.Popen(
+                    command, stdin=stdin, stdout=stdout, stderr=subprocess.PIPE, start_new_session=True
+                )
+            )
+        except BaseException as error:
+            begun.set_exception(error)
+
+    starter = threading.Thread(target=start)
+    try:
+        starter.start()
+        return begun.result()
+    except BaseException:
+        if starter.ident is not None:
+            starter.join()
+            if begun.exception() is None:
+                begun.result().kill()
+                begun.result().wait()
+        raise
 
 
 def _end(process: subprocess.Popen[bytes], listener: threading.Thread) -> None:
