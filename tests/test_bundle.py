@@ -150,6 +150,36 @@ def test_a_point_beyond_infinity_is_held_there() -> None:
     assert SIDE * bundle.rms(bundle.residual(found))[~car].max() < 1e-6
 
 
+def test_a_point_may_not_be_farther_than_told(aside: Scene) -> None:
+    truth = true_estimate(aside)
+    held = np.where(np.arange(len(truth.X)) < 5, 2.0, 0.5) * truth.X[:, 2]
+    bundle = bundle_of(aside).no_farther(held)
+    found = bundle.solve_points(replace(truth, X=np.column_stack([truth.X[:, :2], held])), 20)
+    assert_allclose(found.X[:5, 2], held[:5])
+    assert_allclose(found.X[5:], truth.X[5:], atol=1e-5)
+    error = SIDE * bundle.rms(bundle.residual(found))
+    assert error[:5].min() > 0.5 > 1e-3 > error[5:].max()
+    few = np.arange(3)
+    assert_allclose(bundle.subset(few).farthest, held[:3])
+    # Cameras that give way move such a point's picture, not its depth.
+    _, missed = bundle.without_places(found, True)
+    assert (missed[:5] ** 2).sum(axis=1).min() > (0.5 / SIDE) ** 2
+
+
+def test_the_spread_of_nearness_is_in_units_of_the_cameras_way() -> None:
+    spread = {}
+    for step in (0.05, 0.5):
+        scene = make_scene(Camera.path(step=(step, 0, 0)), static=40)
+        truth, bundle = true_estimate(scene), bundle_of(scene)
+        spread[step] = bundle.spread_of_nearness(truth)
+        assert (spread[step] > 0).all()
+        # One way off by all that is granted: no more than that spread.
+        moved = replace(truth, X=truth.X + spread[step][:, None] * [0, 0, 1])
+        assert np.median(bundle.rms(bundle.residual(moved)) / bundle.tolerance) > 0.9
+    # In units of the camera's way, which is ten times as long.
+    assert np.median(spread[0.05] / spread[0.5]) == pytest.approx(1, rel=0.2)
+
+
 def test_a_camera_that_only_turns() -> None:
     camera = Camera.path(frames=6, step=(0, 0, 0), turn=(0, 0.02, 0.005))
     scene = make_scene(camera, static=60, noise=0.0)

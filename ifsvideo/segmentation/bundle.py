@@ -11,6 +11,7 @@ Picture coordinates here are normalised: origin in the centre, unit the longer s
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,6 +93,8 @@ class Bundle:
         The camera that defines bearings and depth: R = I, t = 0.
     lens_prior, lens_spread : (2,) float
         Expected log focal length and k1, and how far they may be off (standard deviation).
+    farthest : (P,) float, optional
+        Least inverse depth of each point; by default 0, infinitely far.
     """
 
     def __init__(
@@ -103,8 +106,10 @@ class Bundle:
         reference: int,
         lens_prior: Array,
         lens_spread: Array,
+        farthest: Array | float = 0.0,
     ) -> None:
         self.seen = seen
+        self.farthest = np.broadcast_to(np.asarray(farthest, dtype=np.float64), weight.shape)
         self.observed = np.where(seen[:, None], observed, 0.0)
         self.weight = weight
         self.tolerance = tolerance
@@ -125,7 +130,14 @@ class Bundle:
             self.reference,
             self.lens_prior,
             self.lens_spread,
+            self.farthest[points],
         )
+
+    def no_farther(self, farthest: Array | float) -> Bundle:
+        """The same window with other least inverse depths."""
+        other = copy(self)
+        other.farthest = np.broadcast_to(np.asarray(farthest, dtype=np.float64), self.weight.shape)
+        return other
 
     def project(self, e: Estimate) -> Projection:
         """Where the cameras see the points."""
@@ -190,7 +202,7 @@ class Bundle:
             for axis in range(3):
                 V[axis, axis] += damping * V[axis, axis] + 1e-9
             X = e.X - Triangles(V).solve(g).T
-            held = np.clip(X[:, 2], 0.0, nearest)
+            held = np.clip(X[:, 2], self.farthest, nearest)
             beyond = held != X[:, 2]
             if beyond.any():
                 # At a bound the bearing moves with rho held there.
@@ -209,6 +221,16 @@ class Bundle:
             damping = np.where(better, damping / 10, damping * 10)
         return e
 
+    def spread_of_nearness(self, e: Estimate) -> Array:
+        """How far each inverse depth (P,) may be off if all measurements are off by what is granted, one way.
+
+        Of one whose bearing and depth cannot be told apart it is large, not infinite.
+        """
+        own = self._by_point(e, self._by_place(e, self.project(e)))
+        V = np.einsum("kaip,kbip->pab", own, own)
+        V += (1e-9 * np.einsum("paa->p", V) + 1e-12)[:, None, None] * np.eye(3)
+        return np.asarray(self.tolerance * np.sqrt(self.freedom * np.linalg.inv(V)[:, 2, 2]))
+
     def without_places(self, e: Estimate, translate: bool) -> tuple[Array, Array]:
         """Derivatives by cameras and lens (P, 2K, 6 (K - 1) + 2) and residuals (P, 2K) of each point, what
         its own place can make up for taken off.
@@ -221,9 +243,9 @@ class Bundle:
             J[:, 3:6] = 0.0
             own[:, 2] = 0.0
         residual = self._missed(p)
-        # A point that is held at infinity cannot go farther.
+        # A point that is held as far as it may be cannot go farther.
         farther = np.einsum("kip,kip->p", own[:, 2], residual) > 0
-        own[:, 2, :, (e.X[:, 2] <= 0) & farther] = 0.0
+        own[:, 2, :, (e.X[:, 2] <= self.farthest) & farther] = 0.0
         shared = 6 * len(self._free)
         rows: Array = np.zeros((len(e.X), len(J), 2, shared + _GLOBALS + 1))
         for column, k in enumerate(self._free):
@@ -328,7 +350,7 @@ class Bundle:
             if scale > 1e-9:
                 t /= scale
                 X[:, 2] *= scale
-        X[:, 2] = np.maximum(X[:, 2], 0.0)
+        X[:, 2] = np.maximum(X[:, 2], self.farthest)
         lens = e.lens + shared_step[-_GLOBALS:]
         low, high = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
         log_focal, k1 = np.clip(lens, low, high)

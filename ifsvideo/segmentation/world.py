@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.segmentation.bundle import Bundle, Estimate
 from ifsvideo.segmentation.key_frames import key_frames
+from ifsvideo.segmentation.road import find_road
 from ifsvideo.types import Bools, Tracks
 
 Array = NDArray[np.float64]
@@ -51,6 +52,8 @@ LAST_STEPS = 3
 PARALLAX_GAIN = 0.6
 """A camera has moved, too, if points that are surely static then fit so many times better: nothing that moves
 can feign it there. A point's further unknown alone gains a thirtieth."""
+SEEMS_STATIC = 2.5
+"""Error up to which a point may be part of the road, over what is usual."""
 NEAREST = 3.0
 """Nothing is so many times nearer than nearly all that is static, where the camera's way is slight: at a
 hundred times their nearness whatever crosses the view would stand still."""
@@ -144,7 +147,8 @@ class World:
         if len(points) < LEAST_POINTS:
             return self
         few = points[:: 1 + (len(points) - 1) // REFIT_POINTS]
-        before, bundle = self.estimate.X, self.bundle.subset(few)
+        free = self.bundle.no_farther(0.0)
+        before, bundle = self.estimate.X, free.subset(few)
         own = bundle.solve(replace(self.estimate, X=before[few]), REFIT, translate=self.has_moved)
         X, has_moved, nearest = before.copy(), self.has_moved, np.inf
         if has_moved:
@@ -158,8 +162,36 @@ class World:
                 X[:, 2] = np.median(own.X[:, 2])
                 nearest = NEAREST * float(np.percentile(own.X[:, 2], 95))
         X[few] = own.X
-        estimate = self.bundle.solve_points(replace(own, X=X), 6, nearest)
-        return replace(self, estimate=estimate, has_moved=has_moved)
+        estimate = free.solve_points(replace(own, X=X), 6, nearest)
+        return World(self.frames, free, estimate, self.side, has_moved).above_road(points)
+
+    def above_road(self, points: NDArray[np.int64] | None = None) -> World:
+        """The world in which nothing lies below the road, where that is seen.
+
+        Parameters
+        ----------
+        points : (n,) int, optional
+            Those that are surely static; without, all that the world explains.
+        """
+        if not self.has_moved:
+            return self
+        fits = self.rms < SEEMS_STATIC * self.usual * self.tolerance
+        if points is not None:
+            fits &= np.isin(np.arange(len(fits)), points)
+        e = self.estimate
+        centres = -np.einsum("kij,ki->kj", e.R, e.t)
+        spread = self.usual * self.bundle.spread_of_nearness(e) / 2
+        road = find_road(e.X, spread, fits, centres)
+        if road is None:
+            return self
+        bundle = self.bundle.no_farther(road.least_nearness(e.X[:, :2]))
+        below = np.flatnonzero(e.X[:, 2] < bundle.farthest)
+        if not len(below):
+            return self
+        X = e.X.copy()
+        X[below, 2] = bundle.farthest[below]
+        X[below] = bundle.subset(below).solve_points(replace(e, X=X[below]), 6).X
+        return replace(self, bundle=bundle, estimate=replace(e, X=X))
 
 
 def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -> World | None:
@@ -202,7 +234,7 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     far = bundle.solve_points(_with_all(_all_far(few, turned, X[picked]), X, picked), 3)
     has_moved = _has_moved(bundle, moved, far)
     estimate = bundle.solve(moved if has_moved else far, [1.0] * LAST_STEPS, translate=has_moved)
-    return World(frames, bundle, bundle.solve_points(estimate, 3), side, has_moved)
+    return World(frames, bundle, bundle.solve_points(estimate, 3), side, has_moved).above_road()
 
 
 def _thin(seen: Bools, cell: NDArray[np.int64], good: Bools, rng: np.random.Generator) -> NDArray[np.int64]:
