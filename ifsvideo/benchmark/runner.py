@@ -41,9 +41,9 @@ class IFSFactory:
 
     def __call__(self, seed: int) -> Segmenter:
         # Imported here because only a worker needs it.
-        from ifsvideo.segmentation.segmenter import IFSSegmenter
+        from ifsvideo.segmenting import TracksSegmenter
 
-        return IFSSegmenter(self.config, seed)
+        return TracksSegmenter(self.config, seed)
 
 
 @dataclass(frozen=True)

@@ -55,12 +55,15 @@ def anchors(tracks: Tracks) -> NDArray[np.float64]:
 
 
 def groups_by_stage(segmentation: Segmentation, truth: Groups) -> dict[str, Groups]:
-    """Groups after each stage, in their order; a stage that left nothing behind is not there."""
-    stages = {"1 split: static or not": np.where(segmentation.background, 0, 1)}
-    start = _of_all_points(segmentation, "start")
-    if start is not None:
-        stages["3 start: a model for each point"] = _numbered(start)
-    stages["4 refined segments"] = _numbered(segmentation.segments)
+    """Groups after each stage, in their order; a stage that left nothing behind is not there, as where tracks
+    were segmented window by window."""
+    stages: dict[str, Groups] = {}
+    if (segmentation.segments >= 0).any():
+        stages["1 split: static or not"] = np.where(segmentation.background, 0, 1)
+        start = _of_all_points(segmentation, "start")
+        if start is not None:
+            stages["3 start: a model for each point"] = _numbered(start)
+        stages["4 refined segments"] = _numbered(segmentation.segments)
     stages["5 merged"] = segmentation.labels
     stages["truth"] = _as_found(truth, segmentation.labels)
     return stages

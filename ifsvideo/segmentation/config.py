@@ -23,6 +23,10 @@ class SegmenterConfig:
     """How much noisy tracks are smoothed (`ifsvideo.segmentation.smoothing`): not at all below a quarter of a
     pixel of noise; at one pixel this holds back what changes within 30 frames. 0, the thesis's, smoothes
     none."""
+    lasting: float = 0.75
+    """Share of a sequence's frames in which the typical track must be seen for them to be one window; where
+    tracks are shorter, the sequence is cut into windows (`ifsvideo.segmenting`). 0, the thesis's: always one.
+    A clip has windows of its own (`ifsvideo.config.ObjectsConfig`)."""
     split: Literal["world", "epipolar"] = "world"
     """Stage 1: ``epipolar`` is the thesis's (fundamental matrices against the first frame), ``world`` fits
     one rigid perspective scene to all frames at once, which also sees a point behind the camera or below the
@@ -139,6 +143,7 @@ class SegmenterConfig:
         """
         return cls(
             smoothing=0.0,
+            lasting=0.0,
             split="epipolar",
             models=60,
             through_centre=False,

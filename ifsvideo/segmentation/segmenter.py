@@ -70,7 +70,7 @@ class IFSSegmenter:
 
     def _stages(self, tracks: Tracks, motions: int | None) -> Segmentation:
         config, rng = self.config, np.random.default_rng(self.seed)
-        tracks, size = _in_a_picture(tracks)
+        tracks, size = in_a_picture(tracks)
         if config.distortion:
             tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
         unit = float(np.hypot(*size)) / 800
@@ -133,7 +133,7 @@ class IFSSegmenter:
         return support, 2 * (1 - support), None
 
 
-def _in_a_picture(tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
+def in_a_picture(tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
     """The tracks and the size of their picture; where nobody told it, what the points span.
 
     It reaches to the origin where all points lie on its positive side; coordinates from the picture's middle
