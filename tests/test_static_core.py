@@ -26,7 +26,7 @@ def test_a_world_that_stands_on_a_car_is_put_right() -> None:
     wrong = right.fitted_to(np.flatnonzero(truth == 1))
     first = Cues(tracks, tracks.xy[0], np.full(tracks.points, 0.8), wrong.nearness, 1.0, CONFIG.pairs)
     window = Window(truth, np.ones(len(truth), dtype=bool), SIZE)
-    cues = in_static_core(first, window, wrong, learnt().core, CONFIG)
+    cues, _ = in_static_core(first, window, wrong, learnt().core, CONFIG)
     assert np.median(wrong.evidence(5.0)[truth == 0]) > 1
     assert np.median(cues.evidence[truth == 0]) < 0.5
     for car in (1, 2):
@@ -38,5 +38,32 @@ def test_without_a_world_or_a_second_pass_nothing_changes() -> None:
     world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
     cues = Cues(scene.tracks, scene.tracks.xy[0], np.ones(scene.tracks.points), np.zeros(1), 1.0, 10)
     window = Window(scene.truth, np.ones(len(scene.truth), dtype=bool), SIZE)
-    assert in_static_core(cues, window, None, learnt().core, CONFIG) is cues
-    assert in_static_core(cues, window, world, learnt().core, replace(CONFIG, core_doubt=0.0)) is cues
+    assert in_static_core(cues, window, None, learnt().core, CONFIG) == (cues, window)
+    off = replace(CONFIG, core_doubt=0.0)
+    assert in_static_core(cues, window, world, learnt().core, off) == (cues, window)
+
+
+def test_segments_of_the_static_core_that_fit_its_world_are_one_from_then_on() -> None:
+    scene = make_scene(Camera.path(step=(0, 0, 0.3)), (LEFT_CAR, RIGHT_CAR), seed=2)
+    truth, place = scene.truth, scene.tracks.xy[0]
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    assert world is not None
+    # The street in four quarters, each car by itself.
+    quarter = (place > np.array(SIZE) / 2) @ [1, 2]
+    segments = np.where(truth > 0, 3 + truth, quarter).astype(np.int64)
+    window = Window(segments, np.ones(len(truth), dtype=bool), SIZE)
+    first = Cues(scene.tracks, place, world.evidence(5.0), world.nearness, 1.0, CONFIG.pairs)
+    cues, joined = in_static_core(first, window, world, learnt().core, CONFIG)
+    assert len(np.unique(joined.segments)) == 3
+    assert all(len(np.unique(joined.segments[truth == motion])) == 1 for motion in (0, 1, 2))
+    assert np.array_equal(joined.explained, window.explained)
+    # How noisy tracks are is told by what was a segment, not by all the street.
+    noise = cues.noise
+    cues.groups(joined.parts())
+    assert cues.noise == noise == first.noise
+
+
+def test_joined_segments_are_numbered_without_gaps() -> None:
+    window = Window(np.array([0, 1, 2, 3, 3]), np.ones(5, dtype=bool), SIZE)
+    assert window.joined(np.array([1, 3])).segments.tolist() == [0, 1, 2, 1, 1]
+    assert window.joined(np.array([2])) is window

@@ -104,7 +104,7 @@ def judge(judged: Judged) -> list[Score]:
     for rule in judged.rules:
         labels = np.full(len(truth), UNDECIDED, dtype=np.int64)
         merging = Agglomeration(staged.cues, rule)
-        labels[staged.usable], _ = merge_and_label(merging, staged.window, staged.task.config)
+        labels[staged.usable], _ = merge_and_label(merging, staged.joined, staged.task.config)
         scores.append(
             Score(
                 metrics.error(labels, truth), metrics.group_count(labels, truth), metrics.moves(labels, truth)

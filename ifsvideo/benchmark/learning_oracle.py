@@ -77,6 +77,9 @@ class Staged:
     usable : (U,) int
         Points that were segmented; all arrays below have one entry for each of them.
     window : Window
+        The segments of stage 4; all their pairs are learnt from.
+    joined : Window
+        The same, those of the static core as one: where the second pass starts.
     cues : Cues
         What is measured in the world of the static core.
     """
@@ -84,6 +87,7 @@ class Staged:
     task: Task
     usable: NDArray[np.int64]
     window: Window
+    joined: Window
     cues: Cues
 
     @classmethod
@@ -91,7 +95,7 @@ class Staged:
         """Run stages 1 to 4, and the first pass of stage 5 with the rule that the package has for it."""
         found = IFSSegmenter(task.config, task.seed).segment(task.example.sequence.tracks)
         kept = found.details
-        return cls(task, kept["usable"], kept["window"], kept["cues"])
+        return cls(task, kept["usable"], kept["window"], kept["joined"], kept["cues"])
 
     @property
     def truth(self) -> NDArray[np.int64]:

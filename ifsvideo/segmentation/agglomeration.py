@@ -7,7 +7,7 @@ weighs them. They are measured anew after each merge: what many points tell is s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,13 @@ class Window:
     segments: NDArray[np.int64]
     explained: NDArray[np.bool_]
     size: tuple[int, int]
+
+    def joined(self, segments: NDArray[np.int64]) -> Window:
+        """The same window where some segments are one."""
+        if len(segments) < 2:
+            return self
+        as_one = np.where(np.isin(self.segments, segments), segments[0], self.segments)
+        return replace(self, segments=np.unique(as_one, return_inverse=True)[1].astype(np.int64))
 
     def parts(self) -> list[tuple[Members, Members]]:
         """Points of each segment, and those of them that are measured: the explained ones where there are

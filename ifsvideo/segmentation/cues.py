@@ -117,15 +117,14 @@ class Cues:
         return other
 
     def groups(self, segments: list[tuple[Members, Members]]) -> list[Group]:
-        """Groups of the segments that a window starts with: (members, reliable) each."""
+        """Groups of the segments that a window starts with: (members, reliable) each. The first that are
+        asked for tell how noisy tracks are, and what shear is usual inside a segment."""
         found = [self.group(members, reliable) for members, reliable in segments]
-        own = [np.median(g.rigid[g.sample]) for g in found if len(g.sample) >= _LEAST_FOR_NOISE]
-        insides = [g.inside for g in found if np.isfinite(g.inside)]
-        usual = self.noise, self.typical_inside
-        self.noise = max(float(np.median(own)) if own else 0.0, _LEAST_NOISE * self.unit)
-        self.typical_inside = float(np.median(insides)) if insides else 0.0
-        if usual != (self.noise, self.typical_inside):
-            self._pairs = {}  # what was measured in units of them
+        if not self.noise:
+            own = [np.median(g.rigid[g.sample]) for g in found if len(g.sample) >= _LEAST_FOR_NOISE]
+            insides = [g.inside for g in found if np.isfinite(g.inside)]
+            self.noise = max(float(np.median(own)) if own else 0.0, _LEAST_NOISE * self.unit)
+            self.typical_inside = float(np.median(insides)) if insides else 0.0
         return found
 
     def group(self, members: Members, reliable: Members) -> Group:
@@ -140,7 +139,7 @@ class Cues:
 
     def _in_this_world(self, reliable: Members, sample: Members) -> tuple[float, float, Array]:
         """Both evidences and the depth of a group."""
-        evidence = _median(self.evidence[reliable])
+        evidence = median(self.evidence[reliable])
         yielding = evidence if self.leeway is None else self.leeway.evidence(sample)
         return evidence, yielding, _deciles(self.nearness[reliable])
 
@@ -197,8 +196,8 @@ class Cues:
         small, large = sorted((a, b), key=lambda group: (len(group.reliable), -int(group.members[0])))
         insides = [g.inside if np.isfinite(g.inside) else self.typical_inside for g in (a, b)]
         return [
-            _median(large.rigid[small.sample]) / self.noise,
-            _median(large.affine[small.sample]) / self.noise,
+            median(large.rigid[small.sample]) / self.noise,
+            median(large.affine[small.sample]) / self.noise,
             between / self.unit,
             between / max(sum(insides) / 2, 0.02 * self.unit),
             gap / self.unit,
@@ -227,7 +226,7 @@ def _deciles(values: Array) -> Array:
     return np.asarray(below + (above - below) * (place - low))
 
 
-def _median(values: Array) -> float:
+def median(values: Array) -> float:
     """Median of a few values; numpy's own spends ten times as long on its checks."""
     ordered, middle = np.sort(values), len(values) // 2
     return float(ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2)

@@ -112,11 +112,11 @@ class IFSSegmenter:
             nearness = np.zeros(tracks.points) if world is None else world.nearness
             first = Cues(tracks, anchor, evidence, nearness, unit, config.pairs)
             window = Window(segments, fit < config.outlier_cost, size)
-            cues = in_static_core(first, window, world, learnt().core, config)
+            cues, joined = in_static_core(first, window, world, learnt().core, config)
             merging = Agglomeration(cues, learnt().final)
-            labels, confidence = merge_and_label(merging, window, config, motions)
+            labels, confidence = merge_and_label(merging, joined, config, motions)
             evidence = cues.evidence
-            details |= {"window": window, "cues": cues, "merges": merging.merges}
+            details |= {"window": window, "joined": joined, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
         return Segmentation(labels, background, segments, confidence, details)
 

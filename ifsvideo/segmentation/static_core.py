@@ -8,10 +8,12 @@ alone tells truly how all others move.
 
 from __future__ import annotations
 
+import numpy as np
+
 from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.background import static_group
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.cues import Cues
+from ifsvideo.segmentation.cues import Cues, median
 from ifsvideo.segmentation.leeway import Leeway
 from ifsvideo.segmentation.similarity import Similarity
 from ifsvideo.segmentation.world import World
@@ -19,8 +21,12 @@ from ifsvideo.segmentation.world import World
 
 def in_static_core(
     cues: Cues, window: Window, world: World | None, rule: Similarity, config: SegmenterConfig
-) -> Cues:
-    """What is measured in the world of what is surely static.
+) -> tuple[Cues, Window]:
+    """What is measured in the world of what is surely static, and the segments from which merging starts.
+
+    Segments of the first pass's widest group that also fit the world of that group are one segment then: what
+    was known to be one does not fall apart again, where a window is so short, or a scene so deep, that shear
+    and subspaces tell its near parts from its far ones.
 
     Parameters
     ----------
@@ -35,9 +41,12 @@ def in_static_core(
         ``core_doubt`` 0 leaves out this pass.
     """
     if world is None or config.core_doubt == 0:
-        return cues
+        return cues, window
     groups = Agglomeration(cues, rule).run(window, stop=config.core_doubt)
-    core = groups[static_group(groups, cues.anchor, window.size)].reliable
-    own = world.fitted_to(core)
-    leeway = Leeway(own, core, config.evidence_threshold) if own is not world else None
-    return cues.in_world(own.evidence(config.evidence_threshold), own.nearness, leeway)
+    widest = groups[static_group(groups, cues.anchor, window.size)]
+    own = world.fitted_to(widest.reliable)
+    leeway = Leeway(own, widest.reliable, config.evidence_threshold) if own is not world else None
+    again = cues.in_world(own.evidence(config.evidence_threshold), own.nearness, leeway)
+    held = np.unique(window.segments[widest.members])
+    fits = [median(again.evidence[reliable]) < 1 for _, reliable in window.parts()]
+    return again, window.joined(held[np.array(fits)[held]])
