@@ -73,6 +73,16 @@ def test_a_known_rule_is_learnt_again() -> None:
     assert np.array_equal(found.weights, np.round(found.weights, 4))
 
 
+def test_a_cue_that_is_left_out_weighs_nothing() -> None:
+    pairs = [drawn(1000, KNOWN, 0)]
+    whole, less = (learning.fit(pairs, [1.0], left_out) for left_out in (None, "gap"))
+    own = np.array([name.startswith("gap.") for name in feature_names()])
+    assert own.sum() == 3
+    assert whole.weights[own].any()
+    assert not less.weights[own].any()
+    assert less.weights[~own].all()
+
+
 def test_sequences_count_by_their_importance() -> None:
     one, other = drawn(1000, KNOWN, 0), drawn(1000, -KNOWN, 1)
     weights = [learning.fit([one, other], shares).weights for shares in ([1.0, 0.01], [0.01, 1.0])]
@@ -187,7 +197,8 @@ def test_no_sequence_is_judged_by_what_was_learnt_from_its_group(monkeypatch: py
         judged.extend(tasks)
         return [[learning.Score(0.0, 2, MovesCount()), learning.Score(50.0, 1, MovesCount())] for _ in tasks]
 
-    def fit(pairs: Sequence[Pairs], importance: Sequence[float]) -> Similarity:
+    def fit(pairs: Sequence[Pairs], importance: Sequence[float], left_out: str | None) -> Similarity:
+        assert left_out is None
         assert set(importance) == {SOURCE_WEIGHTS["samples"]}
         rule = Similarity(learnt().final.weights.copy())
         used[id(rule)] = [next(k for k, own in enumerate(prepared) if own is one) for one in pairs]
@@ -243,8 +254,15 @@ def test_the_command_learns_tells_and_writes(
     flat = weights["first"] | {f"{cue}.{when}": w for cue in CUES for when, w in weights[cue].items()}
     assert [flat[name] for name in feature_names()] == [report["weights"][name] for name in feature_names()]
 
-    assert command.main(arguments(tmp_path)) == 0
+    assert [one["without"] for one in report["ablation"]] == [None]
+    assert report["ablation"][0]["simulated"] == row["held_out"]["error"]
+
+    assert command.main(arguments(tmp_path, "--ablate", "--json", str(out))) == 0
     assert (tmp_path / "w.toml").read_text() == text
+    told, ablation = capsys.readouterr().out, json.loads(out.read_text())["ablation"]
+    assert [one["without"] for one in ablation] == [None, *CUES]
+    assert ablation[0] == report["ablation"][0]
+    assert all(f"\n{cue} " in told for cue in CUES)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["scores.json", "w.toml"]
 
 

@@ -104,7 +104,8 @@ are of one motion are merged as an oracle would, and pairs of groups on the way 
 the whole of stage 5 runs on every sequence: with weights learnt from five other sixths of the data ("held
 out"; sequences that show the same frames are in one sixth), and with those learnt from all ("in sample").
 Error, exact count, precision and recall are counted as for the point data sets; no group of hopkins155 is
-known to be the background, so that nobody can say there what moves.
+known to be the background, so that nobody can say there what moves. --ablate learns and judges once more
+without each cue (ifsvideo/segmentation/cues.py), held out, and takes about three times as long.
 
 --samples takes the windows of the clips, tracked by the package's own tracker; a track's motion is what the
 masks show under most of its rows there. Simulated windows have the seeds S, S + 1, ...; --only does not
@@ -202,6 +203,7 @@ def _learning_parser() -> argparse.ArgumentParser:
         add(f"--{source}", metavar="DIR", type=Path, help="learn from it; where it lies")
     add("--simulated", metavar="N", type=whole(1), help="learn from so many simulated windows")
     add("--write", metavar="FILE", type=Path, help="write the weights there, as similarity.toml has them")
+    add("--ablate", action="store_true", help="tell what is reached without each cue, too")
     add_runs(parser)
     add_only(parser)
     return parser
@@ -329,9 +331,11 @@ def _learn(options: argparse.Namespace) -> None:
         if target:
             check_writable(target)
     examples = _examples(options)
-    rule, scores = learning.learn(examples, options.runs, options.seed, options.jobs)
+    rule, scores = learning.learn(examples, options.runs, options.seed, options.jobs, ablate=options.ablate)
     command = _command_of(options)
     print(learning.table(scores))
+    if options.ablate:
+        print(f"\n{learning.ablation_table(scores)}")
     if options.write:
         write_text(options.write, learning.as_toml(Rules(learnt().core, rule), command))
         print(f"wrote {options.write}")

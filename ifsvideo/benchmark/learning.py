@@ -38,8 +38,13 @@ DECIMALS = 4
 """Of the weights that are written."""
 
 
-def fit(pairs: Sequence[Pairs], importance: Sequence[float]) -> Similarity:
+def fit(pairs: Sequence[Pairs], importance: Sequence[float], left_out: str | None = None) -> Similarity:
     """Logistic regression with a small ridge, each sequence's pairs weighing its ``importance`` together.
+
+    Parameters
+    ----------
+    left_out : str, optional
+        A cue whose weights stay 0.
 
     Raises
     ------
@@ -52,6 +57,7 @@ def fit(pairs: Sequence[Pairs], importance: Sequence[float]) -> Similarity:
             "too few sequences to learn from: segments of one motion and of two are needed, both"
         )
     X = features(np.concatenate([one.measured for one in pairs]))
+    X[:, [name.split(".")[0] == left_out for name in feature_names()]] = 0.0
     counts = np.concatenate([one.weights() * value for one, value in zip(pairs, importance, strict=True)])
     # The first feature is the constant: neither scaled nor held back by the ridge.
     mean, spread = X.mean(axis=0), X.std(axis=0) + 1e-9
@@ -121,7 +127,12 @@ def folds_of(groups: Sequence[str], seed: int) -> dict[str, int]:
 
 
 def learn(
-    examples: Sequence[Example], runs: int = 1, seed: int = 0, jobs: int = 1, quiet: bool = False
+    examples: Sequence[Example],
+    runs: int = 1,
+    seed: int = 0,
+    jobs: int = 1,
+    quiet: bool = False,
+    ablate: bool = False,
 ) -> tuple[Similarity, Report]:
     """Learn the rule from all examples, and measure it by cross-validation over their groups.
 
@@ -135,6 +146,8 @@ def learn(
     seed, jobs : int
     quiet : bool
         Whether progress is kept off stderr.
+    ablate : bool
+        Whether to learn and judge once more without each cue.
 
     Raises
     ------
@@ -151,13 +164,17 @@ def learn(
     prepared = in_processes(prepare, tasks, jobs, quiet, "stages 1 to 4")
     pairs = [found for _, found in prepared]
 
-    def without(held_out: int | None) -> Similarity:
+    def without(held_out: int | None, cue: str | None = None) -> Similarity:
         chosen = [k for k in range(len(tasks)) if fold[k] != held_out]
-        return fit([pairs[k] for k in chosen], [importance[k] for k in chosen])
+        return fit([pairs[k] for k in chosen], [importance[k] for k in chosen], cue)
 
     rule = without(None)
-    rules = {held_out: without(held_out) for held_out in sorted(set(fold))}
-    judged = [Judged(staged, (rules[f], rule)) for (staged, _), f in zip(prepared, fold, strict=True)]
+    left_out = (None, *CUES) if ablate else (None,)
+    rules = {f: [without(f, cue) for cue in left_out] for f in sorted(set(fold))}
+    judged = [
+        Judged(staged, (rules[f][0], rule, *rules[f][1:]))
+        for (staged, _), f in zip(prepared, fold, strict=True)
+    ]
     scores = in_processes(judge, judged, jobs, quiet, "stage 5")
     rows = [
         _row(task, f, len(found.apart), score)
@@ -169,7 +186,21 @@ def learn(
         "sources": [_summary(source, rows) for source in sources_of(examples)],
         "weights": _named(rule),
         "sequences": rows,
+        "ablation": _ablation(tasks, scores, left_out),
     }
+
+
+def _ablation(
+    tasks: Sequence[Task], scores: Sequence[Sequence[Score]], left_out: Sequence[str | None]
+) -> list[Report]:
+    """Mean error of each source, held out, with all cues and without each of them."""
+    rows: list[Report] = []
+    for place, cue in enumerate(left_out):
+        own: dict[str, list[float]] = {}
+        for task, (held_out, _, *ablated) in zip(tasks, scores, strict=True):
+            own.setdefault(task.example.source, []).append((held_out, *ablated)[place].error)
+        rows.append({"without": cue, **{source: float(np.mean(errors)) for source, errors in own.items()}})
+    return rows
 
 
 def _named(rule: Similarity) -> dict[str, float]:
@@ -187,7 +218,7 @@ def _row(task: Task, fold: int, pairs: int, scores: Sequence[Score]) -> Report:
     """Scores of one run of a sequence."""
     sequence = task.example.sequence
     row = {"source": task.example.source, "name": sequence.name, "seed": task.seed, "fold": fold}
-    reached = {name: asdict(score) for name, score in zip(_RULES, scores, strict=True)}
+    reached = {name: asdict(score) for name, score in zip(_RULES, scores[: len(_RULES)], strict=True)}
     return {**row, "pairs": pairs, "motions": sequence.motions, **reached}
 
 
@@ -225,6 +256,16 @@ def table(report: Report) -> str:
             cells += [row[name]["moves"][figure] for name in _RULES]
         rows.append(cells)
     return align(header, rows)
+
+
+def ablation_table(report: Report) -> str:
+    """A line for each cue that was left out: error of each source, held out."""
+    rows = report["ablation"]
+    sources = [name for name in rows[0] if name != "without"]
+    header = ["without", *(f"{source} %" for source in sources)]
+    return align(
+        header, [[row["without"] or "nothing", *(row[source] for source in sources)] for row in rows]
+    )
 
 
 def as_toml(rules: Rules, command: str) -> str:
