@@ -94,9 +94,9 @@ class SegmenterConfig:
     likely moving as not."""
     least_points: int = 5
     """Points of a moving object; fewer are a mistake more often than a thing."""
-    few_points_doubt: float = 25.0
+    few_points_doubt: float = 20.0
     """Log odds by which a group must be another motion than the background, over the number of its points,
-    and beyond ten over its square: five are believed at 150 to 1, ten at 12 to 1, twenty at 2 to 1. What
+    and beyond ten over its square: five are believed at 55 to 1, ten at 7 to 1, twenty at 3 to 2. What
     slips along an edge is seldom more than a handful."""
     gap: float = 50.0
     """Distance at which what moves alike is several things, pixels: no part of a car is so far from the next.
