@@ -180,6 +180,7 @@ class World:
             fits &= np.isin(np.arange(len(fits)), points)
         e = self.estimate
         centres = -np.einsum("kij,ki->kj", e.R, e.t)
+        # Errors of a track seldom all go one way: half of what that would make.
         spread = self.usual * self.bundle.spread_of_nearness(e) / 2
         road = find_road(e.X, spread, fits, centres)
         if road is None:
