@@ -233,8 +233,8 @@ class Pipeline:
     ) -> None:
         """Give every frame to every sink, as often as it is shown."""
         tell: Progress = progress or (lambda stage, done, total: None)
-        scenes = Scenes(clip.info, look_of(self.config.overlay).trail_s)
         wanted = any(sink.wants_image for sink in sinks)
+        scenes = Scenes(clip.info, look_of(self.config.overlay).trail_s if wanted else 0.0)
         done = 0
         tell("frames", done, clip.info.frames)
         for frame in frames:

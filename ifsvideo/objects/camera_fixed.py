@@ -70,7 +70,7 @@ class CameraFixed:
             return
         ids = np.unique(np.concatenate([frame.ids for frame in recent]))
         looks = list(self._frames)[:: self._every]
-        xy = np.asarray(np.stack([_positions(ids, frame) for frame in looks]), np.float32)
+        xy = np.asarray(np.stack([frame.positions(ids) for frame in looks]), np.float32)
         count = np.isfinite(xy[:, :, 0]).sum(axis=0)
         unit = self._unit(recent)
         bound = self._config.fixed_spread * unit
@@ -119,7 +119,7 @@ class CameraFixed:
         frames = list(self._frames)[-self._new - 1 :]
         self._new = 0
         for before, after in pairwise(frames):
-            there = _positions(before.ids, after)
+            there = after.positions(before.ids)
             goes = np.isin(before.ids, moving)
             counted = np.isfinite(there[:, 0]) & (goes | np.isin(before.ids, still))
             step, goes, xy = (there - before.xy)[counted], goes[counted], before.xy[counted]
@@ -144,14 +144,6 @@ class CameraFixed:
             return float(max(np.hypot(*self._size), 1.0)) / 800
         xy = np.concatenate([frame.xy for frame in recent])
         return float(max(np.hypot(*np.ptp(xy, axis=0)), 1.0)) / 800 if len(xy) else 1.0
-
-
-def _positions(ids: NDArray[np.int64], frame: FramePoints) -> NDArray[np.float32]:
-    """Where tracks were in a frame, (N, 2); NaN where they were not seen."""
-    found = np.full((len(ids), 2), np.nan, np.float32)
-    _, here, there = np.intersect1d(ids, frame.ids, assume_unique=True, return_indices=True)
-    found[here] = frame.xy[there]
-    return found
 
 
 def _ends(xy: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -21,7 +21,7 @@ class Census:
         self._frames = 0
         self._tracks = 0
         self._rows = np.zeros(3, np.int64)
-        self._seen: dict[int, tuple[Ints, Ints]] = {}
+        self._seen: dict[int, tuple[set[int], set[int]]] = {}
         """Tracks of every label, 0 for all: those seen of late, and those seen in the time before that."""
         self._objects: dict[int, MovingObject] = {}
 
@@ -35,7 +35,7 @@ class Census:
             before = self._objects.get(label, MovingObject(label, scene.time_s, scene.time_s, 0))
             self._objects[label] = MovingObject(label, before.first_s, scene.time_s, before.tracks + tracks)
         if scene.frame % _GONE == 0:
-            self._seen = {label: (late[:0], late) for label, (late, _) in self._seen.items() if len(late)}
+            self._seen = {label: (set(), late) for label, (late, _) in self._seen.items() if late}
 
     def finish(self) -> None:
         """See `ifsvideo.types.Sink`."""
@@ -53,9 +53,10 @@ class Census:
 
     def _new(self, ids: Ints, label: int) -> int:
         """How many of these tracks have not been seen so far."""
-        late, before = self._seen.get(label, (ids[:0], ids[:0]))
-        self._seen[label] = (np.union1d(late, ids), before)
-        return len(ids) - int(np.count_nonzero(np.isin(ids, late) | np.isin(ids, before)))
+        late, before = self._seen.setdefault(label, (set(), set()))
+        new = set(ids.tolist()) - late
+        late |= new
+        return len(new - before)
 
 
 class TableSink:
