@@ -110,8 +110,8 @@ def align(
         best.offset[better] = np.hypot(*maps[better, :, 2].T)
         best.warp[better] = maps[better, :, :2]
         if step < STEPS:
-            error = np.einsum("nkp,nk->np", descent, seen - patches)
-            maps = _compose(maps, np.einsum("npq,nq->np", solve, error))
+            error = (seen - patches)[:, None] @ descent
+            maps = _compose(maps, (solve @ error.transpose(0, 2, 1))[:, :, 0])
     return best
 
 
@@ -138,8 +138,9 @@ def _prepare(patches: Patches, radius: int) -> tuple[NDArray[np.float32], NDArra
 
 def _sample(grey: Image, xy: NDArray[np.float32], maps: NDArray[np.float64], radius: int) -> Patches:
     """The picture around each point, through its map (N, 2, 3)."""
-    place = np.einsum("nij,jk->nik", maps[:, :, :2], np.stack(grid(radius)))
-    place = (place + maps[:, :, 2:] + xy[:, :, None]).astype(np.float32)
+    x, y = grid(radius)
+    linear, shift = maps[:, :, :2].astype(np.float32), (maps[:, :, 2] + xy).astype(np.float32)
+    place = linear[:, :, :1] * x + linear[:, :, 1:] * y + shift[:, :, None]
     border = cv2.BORDER_REPLICATE
     pixels = cv2.remap(grey, place[:, 0], place[:, 1], cv2.INTER_LINEAR, borderMode=border)
     return normalise(np.asarray(pixels, np.float32))
@@ -147,11 +148,8 @@ def _sample(grey: Image, xy: NDArray[np.float32], maps: NDArray[np.float64], rad
 
 def _compose(maps: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
     """Each map after the inverse of its small step (N, 6); steps that would fold the patch are cut."""
-    step = np.clip(step, -LONGEST_STEP, LONGEST_STEP)
-    small = np.tile(np.eye(3), (len(step), 1, 1))
-    small[:, :2] += step.reshape(-1, 2, 3)
-    return np.asarray((_square(maps) @ np.linalg.inv(small))[:, :2])
-
-
-def _square(maps: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.concatenate([maps, np.tile([[[0.0, 0.0, 1.0]]], (len(maps), 1, 1))], axis=1)
+    small = np.clip(step, -LONGEST_STEP, LONGEST_STEP).reshape(-1, 2, 3) + np.eye(2, 3)
+    (a, b, _), (c, d, _) = small.transpose(1, 2, 0)
+    inverse = np.stack([d, -b, -c, a], axis=1).reshape(-1, 2, 2) / (a * d - b * c)[:, None, None]
+    linear = maps[:, :, :2] @ inverse
+    return np.concatenate([linear, maps[:, :, 2:] - linear @ small[:, :, 2:]], axis=2)
