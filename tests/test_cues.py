@@ -126,7 +126,7 @@ def test_a_larger_picture_of_the_same_measures_the_same() -> None:
 
 def test_merged_groups_are_measured_as_one() -> None:
     cues, pieces = measure(bodies())
-    merged = cues.merge(pieces[0], pieces[1])
+    merged = cues.merge(pieces[:2])
     whole = cues.group(np.arange(2 * PIECE), np.arange(2 * PIECE))
     assert merged.members.tolist() == list(range(2 * PIECE))
     assert (merged.inside, merged.evidence) == (whole.inside, whole.evidence)

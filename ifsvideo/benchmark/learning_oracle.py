@@ -117,7 +117,7 @@ def oracle_pairs(staged: Staged) -> Pairs:
         gaps = np.array([_distance(cues, known[i][0], known[j][0]) for i, j in same])
         i, j = same[int(np.argmin(gaps * rng.exponential(1.0, len(gaps))))]
         (one, motion), (other, _) = known.pop(i), known.pop(j)
-        merged = cues.merge(one, other)
+        merged = cues.merge([one, other])
         rest = list(known)
         chosen = [known[rest[k]] for k in rng.permutation(len(rest))[:PAIRS_PER_MERGE]]
         seen += [(*entry, merged, motion) for entry in chosen]

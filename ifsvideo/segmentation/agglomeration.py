@@ -7,13 +7,23 @@ weighs them. They are measured anew after each merge: what many points tell is s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.cluster.hierarchy import fcluster, linkage
 
 from ifsvideo.segmentation.cues import Cues, Group, Members
 from ifsvideo.segmentation.similarity import Similarity
+
+Apart = dict[tuple[int, int], float]
+"""How likely pairs of groups, the smaller number first, are two motions."""
+
+SURE = 0.02
+"""Probability of being two motions up to which segments that are all so much alike merge at once, and are
+measured anew once: most merges are as sure as that."""
 
 
 @dataclass(frozen=True)
@@ -68,31 +78,53 @@ class Agglomeration:
 
     def run(self, window: Window, motions: int | None = None, stop: float = 0.5) -> list[Group]:
         """Merge segments until the best pair is two motions with probability ``stop``, or ``motions`` are
-        left."""
+        left: surely alike ones at once, then the best pair after the other."""
         return self.merge(self.cues.groups(window.parts()), motions, stop)
 
-    def merge(self, parts: list[Group], motions: int | None = None, stop: float = 0.5) -> list[Group]:
+    def merge(self, parts: Sequence[Group], motions: int | None = None, stop: float = 0.5) -> list[Group]:
         """The same from groups that were measured already."""
-        groups = dict(enumerate(parts))
-        apart = self._apart(groups, [(i, j) for i in groups for j in groups if i < j])
-        following = len(groups)
+        groups, before = dict(enumerate(parts)), len(self.merges)
+
+        def join(numbers: Sequence[int]) -> None:
+            first, *others = numbers
+            for place, other in enumerate(others, 1):
+                self.merges.append((first, other, max(apart[known, other] for known in numbers[:place])))
+                first = len(parts) + len(self.merges) - before - 1
+            # Measured once, however many they are.
+            groups[first] = self.cues.merge([groups.pop(number) for number in numbers])
+
+        apart = self._apart(groups, {})
+        # Told how many, one pair at a time: sets might leave fewer.
+        while motions is None and (alike := _alike(list(groups), apart, min(SURE, stop))):
+            for numbers in alike:
+                join(numbers)
+            apart = self._apart(groups, apart)
         while apart:
-            (i, j), cost = min(apart.items(), key=lambda item: (item[1], item[0]))
+            pair, cost = min(apart.items(), key=lambda item: (item[1], item[0]))
             if cost > stop if motions is None else len(groups) <= motions:
                 break
-            self.merges.append((i, j, cost))
-            merged = self.cues.merge(groups.pop(i), groups.pop(j))
-            apart = {pair: c for pair, c in apart.items() if i not in pair and j not in pair}
-            groups[following] = merged
-            apart |= self._apart(groups, [(k, following) for k in groups if k != following])
-            following += 1
+            join(pair)
+            apart = self._apart(groups, apart)
         return list(groups.values())
 
     def apart(self, a: Group, b: Group) -> float:
         """Probability that two groups are two motions."""
         return float(self.similarity.apart(self.cues.between([(a, b)]))[0])
 
-    def _apart(self, groups: dict[int, Group], pairs: list[tuple[int, int]]) -> dict[tuple[int, int], float]:
-        """Probability of each pair that it is two motions."""
-        measured = self.cues.between([(groups[i], groups[j]) for i, j in pairs])
-        return dict(zip(pairs, self.similarity.apart(measured).tolist(), strict=True))
+    def _apart(self, groups: dict[int, Group], known: Apart) -> Apart:
+        """Probability of each pair that it is two motions, as far as it is not known already."""
+        pairs = list(combinations(groups, 2))
+        new = [pair for pair in pairs if pair not in known]
+        measured = self.cues.between([(groups[i], groups[j]) for i, j in new])
+        told = known | dict(zip(new, self.similarity.apart(measured).tolist(), strict=True))
+        return {pair: told[pair] for pair in pairs}
+
+
+def _alike(numbers: Sequence[int], apart: Apart, most: float) -> list[list[int]]:
+    """Sets of two and more groups, of which each pair is two motions with at most this probability."""
+    if len(numbers) < 2:
+        return []
+    costs = [apart[pair] for pair in combinations(numbers, 2)]
+    part = fcluster(linkage(costs, "complete"), most, "distance")
+    sets = [[number for number, own in zip(numbers, part, strict=True) if own == p] for p in np.unique(part)]
+    return [members for members in sets if len(members) > 1]

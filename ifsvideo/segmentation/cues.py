@@ -5,6 +5,7 @@ All are logarithms, so that a linear rule weighs ratios: twice the shear, half t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -152,9 +153,12 @@ class Cues:
         inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
         return Group(members, reliable, sample, 0.0, 0.0, np.zeros(3), inside, rigid, affine)
 
-    def merge(self, a: Group, b: Group) -> Group:
-        """Both as one."""
-        return self.group(np.concatenate([a.members, b.members]), np.concatenate([a.reliable, b.reliable]))
+    def merge(self, groups: Sequence[Group]) -> Group:
+        """Some groups as one."""
+        members, reliable = (
+            np.concatenate(parts) for parts in zip(*((g.members, g.reliable) for g in groups), strict=True)
+        )
+        return self.group(members, reliable)
 
     def between(self, pairs: list[tuple[Group, Group]]) -> Array:
         """Measurements (N, 4 + len(CUES)) of pairs of groups: larger and smaller evidence, the same after the
