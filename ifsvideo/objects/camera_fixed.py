@@ -80,7 +80,7 @@ class CameraFixed:
         near = np.flatnonzero((gone <= 4 * bound) & (count >= _LEAST_LOOKS))
         spread[near] = _spread(xy[:, near], count[near])
         still, moving = spread < bound, (spread >= bound) & (gone > 4 * bound)
-        self.ids = np.setdiff1d(self.ids, ids[spread >= bound])
+        self.ids = np.setdiff1d(self.ids, ids[spread >= bound], assume_unique=True)
         self._follow_world(ids[still], ids[moving])
         self._judge(ids[still], spread[still], xy[:, still], unit)
 
@@ -103,7 +103,7 @@ class CameraFixed:
         begin = np.argmax(seen, axis=0) * self._every
         end = (len(seen) - 1 - np.argmax(seen[::-1], axis=0)) * self._every
         found = []
-        for k in np.flatnonzero(~np.isin(ids, self.ids)):
+        for k in np.flatnonzero(~np.isin(ids, self.ids, assume_unique=True)):
             shake = np.linalg.norm(np.ptp(path[begin[k] : end[k] + 1], axis=0))
             enough = max(config.fixed_shake * unit, SHAKE_TO_SPREAD * spread[k])
             if shake > enough and travelled[end[k]] - travelled[begin[k]] > config.fixed_travel * unit:
@@ -120,8 +120,8 @@ class CameraFixed:
         self._new = 0
         for before, after in pairwise(frames):
             there = after.positions(before.ids)
-            goes = np.isin(before.ids, moving)
-            counted = np.isfinite(there[:, 0]) & (goes | np.isin(before.ids, still))
+            goes = np.isin(before.ids, moving, assume_unique=True)
+            counted = np.isfinite(there[:, 0]) & (goes | np.isin(before.ids, still, assume_unique=True))
             step, goes, xy = (there - before.xy)[counted], goes[counted], before.xy[counted]
             if goes.any() and self._share_owned(xy, goes) >= self._config.fixed_world_share:
                 self._common.append(np.median(step[goes], axis=0).astype(np.float64))

@@ -159,7 +159,7 @@ class Shot:
         stride = self._window_size.stride
         rate = self._fps / stride if self._fps else None
         tracks = gather([frame.points for frame in self._frames[start:stop:stride]], self._size, rate)
-        tracks = tracks.select(~np.isin(tracks.ids, self._fixed.ids))
+        tracks = tracks.select(~np.isin(tracks.ids, self._fixed.ids, assume_unique=True))
         self._under_way.append(_Window(bounds, tracks, self._label(tracks)))
 
     def _take(self, window: _Window) -> Iterator[Frame]:
@@ -184,7 +184,7 @@ class Shot:
         block = self._frames[start - self._gone : stop - self._gone]
         for frame in block:
             frame.labels = np.full(len(frame.points.ids), UNDECIDED, dtype=np.int64)
-            known = np.isin(frame.points.ids, ids)
+            known = np.isin(frame.points.ids, ids, assume_unique=True)
             frame.labels[known] = found[np.searchsorted(ids, frame.points.ids[known])]
         if not self._config.check_borders:
             return
@@ -232,7 +232,7 @@ class Shot:
         counts = [self._counts(number) for number in numbers.tolist()]
         numbers[~np.array(counts, bool)] = BACKGROUND
         if on_ground is not None:
-            numbers[np.isin(tracks, on_ground)] = BACKGROUND
+            numbers[np.isin(tracks, on_ground, assume_unique=True)] = BACKGROUND
         labels[moving] = numbers[place]
         labels[np.isin(ids, self._fixed.ids)] = UNDECIDED
         return np.split(labels, np.cumsum([len(frame.labels) for frame in frames])[:-1])
