@@ -181,9 +181,11 @@ class _Level:
 
     ``lower`` and ``upper`` number the edges; ``lower_sum`` and ``upper_sum`` (nodes x edges) add up what runs
     along them; ``lower_owner`` and ``upper_owner`` are the row of the node at the end in this level.
+    ``unary`` (nodes, L) are the nodes' own costs, labels ordered by attribute.
     """
 
     nodes: Indices
+    unary: Array
     gamma: Array
     lower: Indices
     upper: Indices
@@ -227,7 +229,8 @@ class _Messages:
             for owner in owners
         ]
         busiest = np.maximum(*(np.bincount(owner, minlength=len(nodes)) for owner in owners))
-        return _Level(nodes, 1.0 / np.maximum(busiest, 1), lower, upper, *owners, *sums)
+        gamma = 1.0 / np.maximum(busiest, 1)
+        return _Level(nodes, self.unary[nodes], gamma, lower, upper, *owners, *sums)
 
     def forward(self) -> Indices:
         """Renew the messages upwards; return the labelling (N,) fixed on the way.
@@ -237,11 +240,9 @@ class _Messages:
         problem = self.problem
         labels = np.zeros(len(self.unary), np.int64)
         for level in self.schedule:
-            from_above = self.unary[level.nodes] + level.upper_sum @ self.down[level.upper]
-            fixed = labels[problem.edges[level.lower, 0]]
-            labels[level.nodes] = (from_above + level.lower_sum @ self._pairwise(level.lower, fixed)).argmin(
-                1
-            )
+            from_above = level.unary + level.upper_sum @ self.down[level.upper]
+            agreed = self._agreement(level, labels[problem.edges[level.lower, 0]])
+            labels[level.nodes] = (from_above - agreed).argmin(1)
             belief = from_above + level.lower_sum @ self.up[level.lower]
             share = (level.gamma[:, None] * belief)[level.upper_owner]
             self.up[level.upper], _ = self._message(share - self.down[level.upper], level.upper)
@@ -255,7 +256,7 @@ class _Messages:
         """
         bound = 0.0
         for level in reversed(self.schedule):
-            belief = self.unary[level.nodes] + level.lower_sum @ self.up[level.lower]
+            belief = level.unary + level.lower_sum @ self.up[level.lower]
             belief += level.upper_sum @ self.down[level.upper]
             least = belief.min(axis=1, keepdims=True)
             share = (level.gamma[:, None] * (belief - least))[level.lower_owner]
@@ -278,9 +279,13 @@ class _Messages:
         lowest = np.minimum(*least)
         return cost - lowest, lowest[:, 0]
 
-    def _pairwise(self, edges: Indices, fixed: Indices) -> Array:
-        """V(fixed, m) for all m, (n, L)."""
-        count = np.arange(self.unary.shape[1])
-        cost = self.problem.weights[edges, None] * (count != fixed[:, None])
-        cost += self.problem.attribute_weights[edges, None] * (self.kinds != self.kinds[fixed, None])
-        return np.asarray(cost)
+    def _agreement(self, level: _Level, fixed: Indices) -> Array:
+        """What each label of a level's nodes (nodes, L) saves by agreeing with the labels (edges,) that are
+        fixed at the lower ends."""
+        shape, edges = level.unary.shape, level.lower
+        same = np.bincount(
+            level.lower_owner * shape[1] + fixed, self.problem.weights[edges], level.unary.size
+        )
+        place = level.lower_owner * 2 + self.kinds[fixed]
+        same_kind = np.bincount(place, self.problem.attribute_weights[edges], 2 * shape[0]).reshape(-1, 2)
+        return np.asarray(same.reshape(shape) + same_kind[:, self.kinds.astype(np.int64)])
