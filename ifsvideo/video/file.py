@@ -23,8 +23,8 @@ _SEEK_FROM_S = 10.0
 _SEEK_MARGIN_S = 3.0
 """How much earlier the key frame is looked for: files are ordered by time of decoding, ahead of showing."""
 _RGB = ",format=rgb24"
-_PLANES = ":out_color_matrix=bt601:out_range=tv,format=yuv420p"
-"""As `Picture` has them; nothing is computed where the file has them already."""
+_PLANES = {False: ":out_color_matrix=bt601:out_range=tv,format=yuv420p", True: ":out_range=tv,format=yuv420p"}
+"""As `Picture` has them, of BT.709 or not; nothing is computed where the file has them already."""
 _ORIGIN = re.compile(r"^(\[[^\]]*\] )+")  # "[h264 @ 0x5632632572c0] ", which differs from run to run
 
 
@@ -58,6 +58,7 @@ class VideoFile(FrameSource):
         self.path = path
         self._child: ffmpeg.Ffmpeg | None = None
         found = probe(path)
+        self._bt709 = found.bt709
         self._timing = _timing(found, fps)
         rate, zero = self._timing.fps, self._timing.zero
         self._stretch = choose_stretch(path, rate, zero, self._timing.frames, start, end)
@@ -82,10 +83,10 @@ class VideoFile(FrameSource):
         if width % 2 or height % 2:  # half a row of colours cannot be told from a whole one
             yield from super().pictures()
             return
-        planes = self._decode(_PLANES, (height * 3 // 2, width))
+        planes = self._decode(_PLANES[self._bt709], (height * 3 // 2, width))
         with closing(planes):
             for pixels in planes:
-                yield Picture(pixels)
+                yield Picture(pixels, self._bt709)
 
     def stop(self) -> None:
         """See `FrameSource.stop`."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ifsvideo.types import Image
 
 _FULL_RANGE = np.clip(np.round((np.arange(256) - 16) * 255 / 219), 0, 255).astype(np.uint8)
-"""Luma of video, 16 to 235, as grey levels (Rec. ITU-R BT.601)."""
+"""Luma of video, 16 to 235, as grey levels (Rec. ITU-R BT.601, BT.709)."""
 
 _BLOCK = 16
 _CHANGED_BLOCK = 6
@@ -38,10 +38,13 @@ class Picture:
     pixels : uint8
         (H, W, 3) RGB; or (3 H / 2, W), the planes Y, U and V of BT.601, 16 to 235, U and V of half size, one
         after the other (I420); then both sides are even.
+    bt709 : bool
+        Whether the planes are those of BT.709 instead, as in most high definition.
     """
 
-    def __init__(self, pixels: Image) -> None:
+    def __init__(self, pixels: Image, bt709: bool = False) -> None:
         self._kept: Image = pixels
+        self._bt709 = bt709
         self._is_packed = False
 
     @property
@@ -55,7 +58,7 @@ class Picture:
         """The same picture in the form in which it waits: a large one as JPEG, a fifth of the bytes."""
         if self._is_packed or self._kept.nbytes <= LARGEST_KEPT:
             return self
-        packed = Picture(np.asarray(cv2.imencode(".jpg", self._kept, _QUALITY)[1], np.uint8))
+        packed = Picture(np.asarray(cv2.imencode(".jpg", self._kept, _QUALITY)[1], np.uint8), self._bt709)
         packed._is_packed = True
         return packed
 
@@ -65,11 +68,12 @@ class Picture:
         pixels = self.pixels
         if pixels.ndim == 3:
             return pixels
-        return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_YUV2RGB_I420), np.uint8)
+        planes = _as_bt601(pixels) if self._bt709 else pixels
+        return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YUV2RGB_I420), np.uint8)
 
     @property
     def grey(self) -> Image:
-        """(H, W) uint8, the full range of grey levels."""
+        """(H, W) uint8, the full range of grey levels; of planes their own luma."""
         pixels = self.pixels
         if pixels.ndim == 3:
             return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), np.uint8)
@@ -89,22 +93,33 @@ class Picture:
         return bool(cv2.resize(changed, size, interpolation=cv2.INTER_AREA).max() < _CHANGED_BLOCK)
 
 
-_LUMA = np.array([0.2126, 0.7152, 0.0722])
-"""Shares of red, green and blue in the luma of Rec. ITU-R BT.709."""
+_BT601, _BT709 = np.array([0.299, 0.587, 0.114]), np.array([0.2126, 0.7152, 0.0722])
+"""Shares of red, green and blue in the luma."""
+_MIDDLE = 128
+"""U and V of grey."""
 
 
-def _to_video() -> NDArray[np.float32]:
-    """RGB to Y, U and V of BT.709, 16 to 235 and 16 to 240: (3, 4), the last column is added."""
-    blue, red = np.array([0, 0, 1]) - _LUMA, np.array([1, 0, 0]) - _LUMA
-    rows = [
-        _LUMA * 219 / 255,
-        blue / (2 * (1 - _LUMA[2])) * 224 / 255,
-        red / (2 * (1 - _LUMA[0])) * 224 / 255,
-    ]
-    return np.column_stack([rows, [16, 128, 128]]).astype(np.float32)
+def _to_video(luma: NDArray[np.float64]) -> NDArray[np.float64]:
+    """RGB to Y, U and V, 16 to 235 and 16 to 240, by the shares (3,) of luma: (3, 3), without the offsets."""
+    blue, red = np.array([0, 0, 1]) - luma, np.array([1, 0, 0]) - luma
+    rows = [luma * 219, blue / (2 * (1 - luma[2])) * 224, red / (2 * (1 - luma[0])) * 224]
+    return np.array(rows) / 255
 
 
-_TO_VIDEO = _to_video()
+_TO_VIDEO = np.column_stack([_to_video(_BT709), [16, _MIDDLE, _MIDDLE]]).astype(np.float32)
+_TO_BT601 = _to_video(_BT601) @ np.linalg.inv(_to_video(_BT709))
+"""Y, U and V of BT.709 to those of BT.601: luma takes a little of the colours."""
+
+
+def _as_bt601(planes: Image) -> Image:
+    """Planes (3 H / 2, W) of BT.709 as those of BT.601: OpenCV knows the colours of no others."""
+    height, width = len(planes) * 2 // 3, planes.shape[1]
+    u, v = planes[height:].reshape(2, height // 2, width // 2)
+    shares = _TO_BT601[:, 1:]
+    lighter, *colours = (cv2.addWeighted(u, a, v, b, _MIDDLE * (1 - a - b)) for a, b in shares)
+    lighter = cv2.resize(lighter, (width, height), interpolation=cv2.INTER_NEAREST)
+    luma = cv2.addWeighted(planes[:height], 1, lighter, 1, -_MIDDLE)
+    return np.concatenate([luma, np.reshape(colours, (height // 2, width))])
 
 
 def planes_of(image: Image) -> Image:

@@ -20,6 +20,8 @@ from ifsvideo.video import ffmpeg
 VIDEO_STREAM = "0:V:0"
 """The first video stream; the capital V passes over the cover picture of a song."""
 _CONTAINER = re.compile(r"Input #0, ([\w,]+), from")
+_BT709 = re.compile(r"Video: rawvideo.* yuv\w+\((?:\w+, )?bt709[,/)]")
+"""ffmpeg's line on what it decoded: the matrix stands first of those that it names."""
 _AUDIO = re.compile(r"Stream #0:\d+(?:\[0x[0-9a-f]+\])?(?:\(\w*\))?: Audio: (?!none)(\w+)")
 _HIGHEST_PLAIN_RATE = 240
 """Frames per second above which a nominal rate is doubted: often it is but the clock's (1000, 90000)."""
@@ -76,6 +78,8 @@ class Probe:
         Number of packets.
     exact_seek : bool
         Whether a frame can be found by its time without decoding all before it.
+    bt709 : bool
+        Whether it says that its luma and colours are those of Rec. ITU-R BT.709, not BT.601.
     audio_codec : str or None
         ffmpeg's name of the first sound stream's codec.
     """
@@ -89,6 +93,7 @@ class Probe:
     frames: int | None
     packets: int
     exact_seek: bool
+    bt709: bool
     audio_codec: str | None
 
 
@@ -122,6 +127,7 @@ def probe(path: Path) -> Probe:
         frames=_promised(packets, fps, first, constant),
         packets=len(packets.times),
         exact_seek=constant and packets.exact and re.search(r"\b(mp4|matroska)\b", containers) is not None,
+        bt709=any(_BT709.search(line) for line in printed),
         audio_codec=_first_match(_AUDIO, printed),
     )
 
