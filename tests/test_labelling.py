@@ -38,24 +38,27 @@ class Told:
 
 
 @dataclass
-class AtOnce:
-    """Labels that are there already."""
+class Made:
+    """Labels that are there already, or that nobody sees before he waits for them."""
 
     labels: np.ndarray
+    late: bool = False
 
     def done(self) -> bool:
-        return True
+        return not self.late
 
     def value(self) -> np.ndarray:
         return self.labels
 
 
-def label_clip(clip: Trajectories, segmenter: Segmenter, config: ObjectsConfig) -> np.ndarray:
+def label_clip(
+    clip: Trajectories, segmenter: Segmenter, config: ObjectsConfig, late: bool = False
+) -> np.ndarray:
     """Label of every row of a clip."""
     labeller = WindowLabeller(segmenter, config)
 
-    def label(tracks: Tracks) -> AtOnce:
-        return AtOnce(labeller(tracks))
+    def label(tracks: Tracks) -> Made:
+        return Made(labeller(tracks), late)
 
     frames = list(label_frames(steps_of(clip), label, config, clip.size, clip.fps))
     assert [frame.place for frame in frames] == list(range(clip.frames))
@@ -102,6 +105,22 @@ def test_points_fixed_to_the_camera_are_undecided_for_life() -> None:
     labels = label_clip(clip, Told(lambda ids, _: np.zeros(len(ids))), CONFIG)
     assert numbers_of(clip, labels, np.arange(200, 210)) == [-1]
     assert numbers_of(clip, labels, np.arange(200)) == [0]
+
+
+def test_labels_do_not_depend_on_how_fast_windows_are_labelled() -> None:
+    """The world begins to shake late: what is fixed to the camera is found out while windows wait."""
+    smooth, shaking = (Camera.path(frames=150, step=(0, 0, 0.1), shake=shake) for shake in (0.0, 0.02))
+    paths = [make_scene(camera).tracks.xy for camera in (smooth, shaking)]
+    world = np.concatenate([paths[0][:70], paths[1][70:] - paths[1][70] + paths[0][70]])
+    rng = np.random.default_rng(0)
+    logo = rng.uniform((20, 400), (200, 470), (10, 2)) + rng.normal(0, 0.05, (150, 10, 2))
+    both = Tracks.from_array(np.concatenate([world, logo], axis=1))
+    clip = replace(Trajectories.from_tracks(both), size=SIZE, fps=FPS)
+    told = [label_clip(clip, Told(lambda ids, _: np.zeros(len(ids))), CONFIG, late) for late in (False, True)]
+    assert np.array_equal(*told)
+    of_logo = told[0][clip.ids >= 200]
+    assert of_logo[0] == 0
+    assert of_logo[-1] == -1
 
 
 def test_before_a_standing_camera_all_is_background() -> None:

@@ -81,7 +81,7 @@ class CameraFixed:
         spread[near] = _spread(xy[:, near], count[near])
         still, moving = spread < bound, (spread >= bound) & (gone > 4 * bound)
         self.ids = np.setdiff1d(self.ids, ids[spread >= bound], assume_unique=True)
-        self._follow_world(ids[still], ids[moving])
+        self._follow_world(ids, still, moving)
         self._judge(ids[still], spread[still], xy[:, still], unit)
 
     def _judge(
@@ -110,18 +110,22 @@ class CameraFixed:
                 found.append(ids[k])
         self.ids = np.union1d(self.ids, np.array(found, np.int64))
 
-    def _follow_world(self, still: NDArray[np.int64], moving: NDArray[np.int64]) -> None:
-        """Median step of the moving points, and median length of their steps, for every new frame.
+    def _follow_world(self, ids: NDArray[np.int64], still: Bools, moving: Bools) -> None:
+        """Median step of the moving points, and median length of their steps, for every new frame; of each of
+        some tracks, ordered, whether it stays or moves.
 
         Both are zero in frames in which such points own a small part of the picture only: they are movers
         then, before a camera that stands still.
         """
         frames = list(self._frames)[-self._new - 1 :]
         self._new = 0
+        names, still, moving = np.append(ids, -1), np.append(still, False), np.append(moving, False)
         for before, after in pairwise(frames):
             there = after.positions(before.ids)
-            goes = np.isin(before.ids, moving, assume_unique=True)
-            counted = np.isfinite(there[:, 0]) & (goes | np.isin(before.ids, still, assume_unique=True))
+            place = np.searchsorted(ids, before.ids)
+            known = (names[place] == before.ids) & np.isfinite(there[:, 0])
+            goes = known & moving[place]
+            counted = goes | (known & still[place])
             step, goes, xy = (there - before.xy)[counted], goes[counted], before.xy[counted]
             if goes.any() and self._share_owned(xy, goes) >= self._config.fixed_world_share:
                 self._common.append(np.median(step[goes], axis=0).astype(np.float64))

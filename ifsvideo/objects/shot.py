@@ -65,10 +65,12 @@ class Frame:
 
 @dataclass(frozen=True)
 class _Window:
-    """A window that is being labelled."""
+    """A window that is being labelled, and the tracks that were known to be fixed to the camera when that
+    began."""
 
     bounds: Bounds
     tracks: Tracks
+    fixed: NDArray[np.int64]
     labels: Promise
 
 
@@ -108,6 +110,9 @@ class Shot:
         self._window_size = WindowSize.at(fps, config)
         self._windows = Windows(self._window_size)
         self._fixed = CameraFixed(size, fps, config)
+        self._fixed_ids = self._fixed.ids
+        """What was known of them when the last window that is linked was asked for: later frames may have
+        told more by now, or not, depending on who was faster."""
         self._still: set[int] = set()
         """Objects that are fixed to the camera as a whole, as the linker numbers them."""
         self._borders = FigureGround(scale, fps)
@@ -159,12 +164,13 @@ class Shot:
         stride = self._window_size.stride
         rate = self._fps / stride if self._fps else None
         tracks = gather([frame.points for frame in self._frames[start:stop:stride]], self._size, rate)
-        tracks = tracks.select(~np.isin(tracks.ids, self._fixed.ids, assume_unique=True))
-        self._under_way.append(_Window(bounds, tracks, self._label(tracks)))
+        fixed = self._fixed.ids
+        tracks = tracks.select(~np.isin(tracks.ids, fixed, assume_unique=True))
+        self._under_way.append(_Window(bounds, tracks, fixed, self._label(tracks)))
 
     def _take(self, window: _Window) -> Iterator[Frame]:
         """Link a window; that makes the labels of earlier frames final."""
-        stride = self._window_size.stride
+        stride, self._fixed_ids = self._window_size.stride, window.fixed
         decided = long_enough(window.tracks, self._config)
         said = window.labels.value()
         found = self._linker.link(
@@ -234,7 +240,7 @@ class Shot:
         if on_ground is not None:
             numbers[np.isin(tracks, on_ground, assume_unique=True)] = BACKGROUND
         labels[moving] = numbers[place]
-        labels[np.isin(ids, self._fixed.ids)] = UNDECIDED
+        labels[np.isin(ids, self._fixed_ids)] = UNDECIDED
         return np.split(labels, np.cumsum([len(frame.labels) for frame in frames])[:-1])
 
     def _counts(self, number: int) -> bool:

@@ -12,11 +12,11 @@ from scipy.spatial import cKDTree
 
 from ifsvideo.config import TrackerConfig
 from ifsvideo.errors import UsageError
-from ifsvideo.tracking.appearance import correlation, cut
+from ifsvideo.tracking.appearance import Patches, correlation, cut
 from ifsvideo.tracking.corners import find_corners, most_crowded
 from ifsvideo.tracking.drift import References
 from ifsvideo.tracking.klt import Search, flatten, follow
-from ifsvideo.types import Bools, FramePoints, Image
+from ifsvideo.types import Bools, FramePoints, Image, Ints
 
 SMALLEST = 16
 """Least side of a picture that is searched, pixels; smaller ones hold no window and have no points."""
@@ -108,6 +108,8 @@ class _Life:
         self.ids = np.empty(0, np.int64)
         self.xy = np.empty((0, 2), np.float32)
         self.references = References.none(self.search.window // 3)
+        self.looks = self.references.patches
+        """What each track sees in the frame before."""
         self.previous: Image | None = None
         self.next_id = 0
         self.frame = 0
@@ -128,12 +130,12 @@ class _Life:
 
     def _live(self, before: Image, after: Image) -> None:
         """Follow every track to the next frame; those that fail a check end."""
-        moved, alive = self._step(before, after, self.xy)
+        moved, alive, self.looks = self._step(before, after, self.xy, self.looks)
         if len(alive) and np.mean(~alive) > SUDDEN_LOSS:
             lost = np.flatnonzero(~alive)
-            again, found = self._step(flatten(before), flatten(after), self.xy[lost])
-            moved[lost[found]] = again[found]
-            alive[lost[found]] = True
+            found = self._again(before, after, lost, moved)
+            self.looks[found] = cut(after, moved[found], self.references.radius)
+            alive[found] = True
             if np.mean(alive) < CUT:
                 alive[:] = False
         alive &= self._inside(moved)
@@ -144,7 +146,7 @@ class _Life:
 
     def _keep(self, which: Bools) -> None:
         """End all other tracks."""
-        self.ids, self.xy = self.ids[which], self.xy[which]
+        self.ids, self.xy, self.looks = self.ids[which], self.xy[which], self.looks[which]
         self.references.keep(which)
 
     def _faithful(self, grey: Image) -> Bools:
@@ -156,17 +158,26 @@ class _Life:
         faithful[turn] &= verdict.offset <= max(1.0, self.config.max_drift * self.diagonal)
         return faithful
 
+    def _again(
+        self, before: Image, after: Image, lost: Ints, moved: NDArray[np.float32]
+    ) -> NDArray[np.int64]:
+        """Look for lost tracks once more, without brightness and contrast; which were found, in ``moved``."""
+        flat, xy = flatten(before), self.xy[lost]
+        looks = cut(flat, xy, self.references.radius)
+        again, believed, _ = self._step(flat, flatten(after), xy, looks)
+        moved[lost[believed]] = again[believed]
+        return np.asarray(lost[believed], np.int64)
+
     def _step(
-        self, before: Image, after: Image, xy: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], Bools]:
-        """Points in the next frame, and which of them can be believed."""
+        self, before: Image, after: Image, xy: NDArray[np.float32], looks: Patches
+    ) -> tuple[NDArray[np.float32], Bools, Patches]:
+        """Points in the next frame, which of them can be believed, and what they see there."""
         config = self.config
         moved, return_error = follow(before, after, xy, self.search)
         believed = return_error <= max(0.5, config.max_return_error * self.diagonal)
         believed &= np.hypot(*(moved - xy).T) <= config.max_step * self.diagonal
-        radius = self.references.radius
-        similar = correlation(cut(before, xy, radius), cut(after, moved, radius))
-        return moved, believed & (similar >= config.min_similarity)
+        seen = cut(after, moved, self.references.radius)
+        return moved, believed & (correlation(looks, seen) >= config.min_similarity), seen
 
     def _bear(self, grey: Image) -> None:
         """Let new tracks begin where the picture has room."""
@@ -179,6 +190,7 @@ class _Life:
         self.ids = np.concatenate([self.ids, self.next_id + np.arange(len(born), dtype=np.int64)])
         self.xy = np.concatenate([self.xy, born])
         self.references.add(grey, born)
+        self.looks = np.concatenate([self.looks, self.references.patches[len(self.looks) :]])
         self.next_id += len(born)
         self.after_birth = len(self.ids)
 
