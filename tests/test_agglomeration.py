@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 from ifsvideo.segmentation.agglomeration import Agglomeration, Window
-from ifsvideo.segmentation.cues import CUES, Cues
+from ifsvideo.segmentation.cues import CUES, Cues, Group
 from ifsvideo.segmentation.similarity import Similarity, feature_names, learnt
 from ifsvideo.segmentation.world import fit_world
 from ifsvideo.types import Tracks
@@ -88,6 +90,28 @@ def test_merging_starts_with_the_likeliest_and_stops_at_one_half() -> None:
     merging.run(window(np.repeat(np.arange(4), 3)), 1)
     # The pair becomes number 4; then what is nearest to it, and the result is number 5.
     assert [merge[:2] for merge in merging.merges] == [(1, 2), (0, 4), (3, 5)]
+
+
+def test_what_is_surely_alike_merges_at_once() -> None:
+    """A rule that knows the gap only, sure below 8.6 pixels: each of three is as near to both others, and of
+    three in a row the ends are not."""
+    place = np.array([[0.0, 0.0], [200.0, 0.0], [6.0, 0.0], [206.0, 0.0], [3.0, 5.0], [215.0, 0.0]])
+    xy = (place[:, None] + [[-1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]).reshape(-1, 2)[None] + np.zeros((4, 1, 1))
+    cues = Cues(Tracks.from_array(xy), xy[0], np.ones(18), np.zeros(18), 1.0, 10)
+    measured: list[int] = []
+
+    class Counting(Cues):
+        def merge(self, groups: Sequence[Group]) -> Group:
+            measured.append(len(groups))
+            return super().merge(groups)
+
+    cues.__class__ = Counting
+    merging = Agglomeration(cues, rule(gap_always=2.0, constant=-2 * np.log(60)))
+    groups = merging.run(window(np.repeat(np.arange(6), 3)))
+    assert measured == [3, 2, 2]
+    assert [merge[:2] for merge in merging.merges] == [(0, 2), (4, 6), (1, 3), (5, 8)]
+    assert [len(group.members) for group in groups] == [9, 9]
+    assert merging.merges[1][2] == pytest.approx(max(merge[2] for merge in merging.merges[:2]))
 
 
 def test_points_that_no_model_explains_are_carried_along() -> None:

@@ -146,6 +146,22 @@ def test_colours_of_the_picture_survive(tmp_path: Path) -> None:
     assert next(open_source(path).frames())[20, 20] == pytest.approx((200, 30, 10), abs=1)
 
 
+@pytest.mark.parametrize("matrix", ["bt709", "smpte170m"])
+def test_planes_have_the_colours_that_the_file_says(tmp_path: Path, matrix: str) -> None:
+    """Saturated colours differ by up to 30 grey levels between the two."""
+    path = tmp_path / "bars.mkv"
+    tagged = f"scale=out_color_matrix={matrix}:out_range=tv,format=yuv420p,setparams=colorspace={matrix}"
+    bars = ("-f", "lavfi", "-i", "smptebars=s=128x96:r=5:d=1")
+    ffmpeg(*bars, "-vf", tagged, "-c:v", "ffv1", "-colorspace", matrix, path)
+    source = open_source(path)
+    expected = next(source.frames()).astype(float)
+    picture = next(source.pictures())
+    assert np.abs(picture.rgb - expected).mean() < 2
+    assert np.abs(picture.to_wait().rgb - expected).mean() < 2
+    shares = (0.2126, 0.7152, 0.0722) if matrix == "bt709" else (0.299, 0.587, 0.114)
+    assert np.abs(picture.grey - expected @ shares).mean() < 2, "grey is the file's own luma"
+
+
 VARIABLE = (
     "-vf",
     "select='if(gt(n,9)*lt(n,15)+eq(n,20),0,1)'",

@@ -88,7 +88,8 @@ class Agglomeration:
         def join(numbers: Sequence[int]) -> None:
             first, *others = numbers
             for place, other in enumerate(others, 1):
-                self.merges.append((first, other, max(apart[known, other] for known in numbers[:place])))
+                cost = max(apart[known, other] for known in numbers[:place])
+                self.merges.append((min(first, other), max(first, other), cost))
                 first = len(parts) + len(self.merges) - before - 1
             # Measured once, however many they are.
             groups[first] = self.cues.merge([groups.pop(number) for number in numbers])
