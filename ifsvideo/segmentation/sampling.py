@@ -129,7 +129,7 @@ def _best_triple(
     ``through`` names a point that must be one of the three."""
     if len(support) < 3:
         return None
-    triples = _triples(len(support), config.ransac_iterations, rng)
+    triples = np.array([rng.choice(len(support), 3, replace=False) for _ in range(config.ransac_iterations)])
     if through is not None:
         own = int(np.searchsorted(support, through))
         triples[~(triples == own).any(axis=1), 0] = own
@@ -160,13 +160,3 @@ def _best_triple(
     chosen = np.array(inlier[winner])
     chosen[triples[winner]] = True
     return support[chosen], support[triples[winner]]
-
-
-def _triples(count: int, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """So many triples (N, 3) of different numbers below ``count``; numpy's own way draws one at a time."""
-    first, second, third = (rng.integers(count - taken, size=number) for taken in range(3))
-    second += second >= first  # the second of those that the first left over, and so on
-    low, high = np.minimum(first, second), np.maximum(first, second)
-    third += third >= low
-    third += third >= high
-    return np.stack([first, second, third], axis=1)
