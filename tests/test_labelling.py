@@ -123,6 +123,21 @@ def test_labels_do_not_depend_on_how_fast_windows_are_labelled() -> None:
     assert of_logo[-1] == -1
 
 
+@pytest.mark.parametrize("gap", [20, 40, 60, 80])
+def test_nor_do_those_of_tracks_with_gaps(gap: int) -> None:
+    """A tracker of one's own may find a track again: what is still known of it is no matter of speed."""
+    scene = make_scene(
+        Camera.path(frames=180, step=(0, 0, 0.1)), (Mover((-1.0, 0.5, 25.0), (0.02, 0.0, 0.1)),)
+    )
+    seen = np.ones(scene.tracks.visible.shape, dtype=bool)
+    seen[70 : 70 + gap, scene.truth == 1] = False
+    clip = clip_of(replace(scene, tracks=Tracks.from_array(scene.tracks.xy, seen & scene.tracks.visible)))
+    moves = scene.truth == 1
+    told = [label_clip(clip, Told(lambda ids, _: moves[ids] * 1), CONFIG, late) for late in (False, True)]
+    assert np.array_equal(*told)
+    assert {0, 1} <= set(np.unique(told[0]))
+
+
 def test_before_a_standing_camera_all_is_background() -> None:
     clip = standing_crowd()
     assert not label_clip(clip, IFSSegmenter(), CONFIG).any()

@@ -17,7 +17,7 @@ from ifsvideo.objects.windows import WindowLabeller
 from ifsvideo.tracking.steps import Step
 from ifsvideo.types import FramePoints, Segmentation, Tracks
 
-from .test_labelling import AtOnce
+from .test_labelling import Made
 
 FPS, SECONDS, SIZE = 10.0, 300, (640, 480)
 OBJECTS, POINTS, GROUND = 30, 14, 60
@@ -134,8 +134,8 @@ def test_thirty_objects_keep_their_numbers(seed: int) -> None:
     owner = np.array(made.owner)
     labeller = WindowLabeller(Knows(owner, np.random.default_rng(seed)), config)
 
-    def label(tracks: Tracks) -> AtOnce:
-        return AtOnce(labeller(tracks))
+    def label(tracks: Tracks) -> Made:
+        return Made(labeller(tracks))
 
     frames = list(label_frames(made.steps, label, config, SIZE, FPS))
     labels = np.concatenate([frame.labels for frame in frames])

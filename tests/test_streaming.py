@@ -29,7 +29,7 @@ from ifsvideo.video.picture import Picture
 from ifsvideo.worker import Caller, Worker
 
 from .conftest import FFMPEG, FPS, HEIGHT, WIDTH, children_naming, decoded, encode, pictures, texture
-from .test_labelling import AtOnce
+from .test_labelling import Made
 from .test_pipeline import ByStep
 
 FEW = TrackerConfig(max_points=150)
@@ -104,7 +104,7 @@ def test_repeated_frames_do_not_fake_stillness() -> None:
     assert sum(step.repeats for step in found) == 160
     config = Config().objects
     labeller = WindowLabeller(given, config)
-    frames = list(label_frames(found, lambda tracks: AtOnce(labeller(tracks)), config, (160, 120), 20.0))
+    frames = list(label_frames(found, lambda tracks: Made(labeller(tracks)), config, (160, 120), 20.0))
     assert min(given.steps) == pytest.approx(2.0)
     assert [frame.shown for frame in frames] == [5] * 40
     assert [frame.place for frame in frames] == list(range(0, 200, 5))

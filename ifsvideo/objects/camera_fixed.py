@@ -59,10 +59,6 @@ class CameraFixed:
         self._frames.append(points)
         self._new += 1
 
-    def forget(self, alive: NDArray[np.int64]) -> None:
-        """Drop what is known of all other tracks: they will not come again."""
-        self.ids = np.intersect1d(self.ids, alive)
-
     def update(self) -> None:
         """Look at the tracks seen since the last update."""
         recent = list(self._frames)[-self._new :]
@@ -81,6 +77,8 @@ class CameraFixed:
         spread[near] = _spread(xy[:, near], count[near])
         still, moving = spread < bound, (spread >= bound) & (gone > 4 * bound)
         self.ids = np.setdiff1d(self.ids, ids[spread >= bound], assume_unique=True)
+        # Of what has ended nobody asks any more once it is out of memory.
+        self.ids = np.intersect1d(self.ids, np.concatenate([frame.ids for frame in looks]))
         self._follow_world(ids, still, moving)
         self._judge(ids[still], spread[still], xy[:, still], unit)
 

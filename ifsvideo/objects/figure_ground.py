@@ -143,9 +143,9 @@ class FigureGround:
         shows_ground = can_tell & (to_ground + _NOISE < ratio * (to_object + _NOISE))
         return np.asarray(ids[shows_ground], np.int64)
 
-    def forget(self, alive: NDArray[np.int64]) -> None:
-        """Drop what is known of all other tracks: they will not come again."""
-        kept = np.isin(self._ids, alive)
+    def forget(self, gone: NDArray[np.int64]) -> None:
+        """Drop what is known of some tracks (T,) that have ended; one that comes again is a new one."""
+        kept = ~np.isin(self._ids, gone, assume_unique=True)
         self._ids, self._sums = self._ids[kept], self._sums[kept]
 
     def _with_rows_of(self, frames: Sequence[_Seen]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

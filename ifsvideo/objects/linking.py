@@ -66,12 +66,11 @@ class Linker:
         """How sure of an object the window was that was surest, 0 to 1."""
         return self._surest.get(number, 0.0)
 
-    def forget(self, alive: NDArray[np.int64]) -> None:
-        """Drop what is known of all other tracks: they will not come again."""
-        living = set(alive.tolist())
-        for given in (self._given, self._guessed):
-            for track in given.keys() - living:
-                del given[track]
+    def forget(self, gone: NDArray[np.int64]) -> None:
+        """Drop what is known of some tracks (T,) that have ended; one that comes again is a new one."""
+        for track in gone.tolist():
+            self._given.pop(track, None)
+            self._guessed.pop(track, None)
 
     def link(
         self,

@@ -125,6 +125,8 @@ class Shot:
         self._under_way: deque[_Window] = deque()
         self._linked: deque[tuple[Bounds, NDArray[np.int64], NDArray[np.int64]]] = deque()
         """Windows that are linked, the ids of their tracks and the labels of these."""
+        self._linked_to = 0
+        """End of the last window that is linked."""
         self._blocks: deque[int] = deque()
         """Ends of the blocks of frames, each labelled by one window, that wait for the next to be."""
 
@@ -177,6 +179,7 @@ class Shot:
             window.tracks, said.labels, decided, said.confidence, start=window.bounds[0], stride=stride
         )
         self._linked.append((window.bounds, window.tracks.ids, found))
+        self._linked_to = window.bounds[1]
         if len(self._linked) > 1:
             self._prepare((self._linked[0][0][1] + self._linked[1][0][0]) // 2)
         if len(self._blocks) > 1:
@@ -213,10 +216,11 @@ class Shot:
             frame.labels = own.astype(np.int64)
         del self._frames[:wanted]
         self._gone += wanted
-        if self._frames:
-            alive = np.unique(np.concatenate([frame.points.ids for frame in self._frames]))
-            for part in (self._fixed, self._borders, self._linker):
-                part.forget(alive)
+        # Not what later frames show: how many there are by now depends on who was faster.
+        going_on = self._frames[: self._linked_to - self._gone]
+        gone = np.setdiff1d(_ids_of(known[:wanted]), _ids_of(going_on), assume_unique=True)
+        for part in (self._borders, self._linker):
+            part.forget(gone)
         yield from known[:wanted]
 
     def _labels_now(
@@ -249,3 +253,8 @@ class Shot:
         surest = self._linker.surest(number)
         lasting = self._linker.windows_of(number) >= self._least_windows
         return surest >= (self._config.least_confidence if lasting else self._config.alone_confidence)
+
+
+def _ids_of(frames: Sequence[Frame]) -> NDArray[np.int64]:
+    """Tracks (T,) that are seen in some frames, ordered."""
+    return np.unique(np.concatenate([np.empty(0, np.int64), *(frame.points.ids for frame in frames)]))
