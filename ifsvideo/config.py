@@ -175,12 +175,8 @@ class ObjectsConfig:
     """How long repeated frames are taken for no frames, seconds; what the camera did not send, or the change
     of a rate put in, is shorter."""
     check_borders: bool = True
-    """Whether tracks that move with an object are asked if their own pixels show it or the ground behind it
+    """Whether tracks that move with an object are asked if they lie on it or on the ground beside it
     (`ifsvideo.objects.figure_ground`)."""
-    least_ground_misfit: float = 1.65
-    """How many times worse than the object the ground must fit the pixels of a track called moving. Less, and
-    corners outside an outline stay with the object; at 2.1, one in a hundred of those on it is lost for
-    nothing (``python -m ifsvideo.benchmark samples --config``)."""
     fixed_spread: float = 0.9
     """Radius within which a point fixed to the camera stays, pixels: KLT's jitter on a weak reflection."""
     fixed_shake: float = 3.0
@@ -210,7 +206,6 @@ class ObjectsConfig:
                 raise UsageError(f"objects.{name} must be 0 to 1, got {getattr(self, name)}")
         for name in (
             "least_seconds",
-            "least_ground_misfit",
             "fixed_travel",
             "longest_loss_s",
             "longest_freeze_s",

@@ -223,13 +223,26 @@ def test_numbers_follow_the_order_of_appearance_without_gaps() -> None:
     assert np.unique(labels).tolist() == [0, 1, 2]
 
 
-def test_each_frame_takes_the_label_of_the_window_whose_centre_is_nearest() -> None:
+def changes(says: list[int]) -> list[int]:
+    """Frames at which the first track's label changes, given what its windows say one after the other."""
     clip = standing_crowd(frames=90)
-    labels = label_clip(clip, Told(lambda ids, window: np.full(len(ids), window % 2)), CONFIG)
-    changes = np.flatnonzero(np.diff([labels[clip.frame == f][0] for f in range(90)])) + 1
+    labels = label_clip(clip, Told(lambda ids, window: np.full(len(ids), says[window])), CONFIG)
+    return (np.flatnonzero(np.diff([labels[clip.frame == f][0] for f in range(90)])) + 1).tolist()
+
+
+def test_each_frame_takes_the_label_of_the_window_whose_centre_is_nearest() -> None:
     starts = np.arange(0, 61, CONFIG.window_frames // 2)
     centres = starts + CONFIG.window_frames / 2
-    assert changes.tolist() == pytest.approx(((centres[1:] + centres[:-1]) / 2).tolist(), abs=1)
+    between = (centres[1:] + centres[:-1]) / 2
+    assert len(starts) == 5
+    assert changes([0, 1, 1, 0, 0]) == pytest.approx(between[[0, 2]].tolist(), abs=1)
+
+
+def test_a_window_that_misses_what_those_on_either_side_saw_is_not_believed() -> None:
+    """But one at the beginning or at the end is: the object may have begun to move, or have stopped."""
+    assert changes([1, 1, 0, 1, 1]) == []
+    assert changes([1, 0, -1, 1, 1]) != []
+    assert len(changes([0, 1, 0, 1, 1])) == 1
 
 
 def test_short_tracks_follow_their_neighbours() -> None:

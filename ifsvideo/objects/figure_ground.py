@@ -1,88 +1,109 @@
-"""Figure or ground: does the picture at the very point move with the object, or with the ground behind it?
+"""Figure or ground: does a track lie on the object with which it moves, or on the ground beside it?
 
 KLT follows a window. Where the outline of an object crosses a line of the background, a corner is found a few
 pixels outside the object; its window sees the outline and rides along, and by its motion the track cannot be
-told from the object's own. The few pixels in the middle of the window can tell: on the object they look a few
-frames later like those at the track's own place, on the ground like those where the ground has gone
-meanwhile. What is covered or uncovered between the two frames looks like neither; but the outline covers on
-one side only of the time at which the point is looked at, so both sides are asked and the better one counts.
+told from the object's own. The picture can tell: every few frames the object's silhouette is found
+(`ifsvideo.objects.silhouette`), and each track near it is asked whether it lies there.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Sequence
+from collections import Counter, deque
+from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
-from scipy.spatial import cKDTree
 
-from ifsvideo.tracking.appearance import grid
+from ifsvideo.objects import parting
+from ifsvideo.objects.parting import NODES, Motions, have_parted
+from ifsvideo.objects.silhouette import Flow, Parted, View, find_silhouette
 from ifsvideo.tracking.tracker import shrunk, tracked_size
-from ifsvideo.types import BACKGROUND, FramePoints, Image, Ints
+from ifsvideo.types import BACKGROUND, Bools, FramePoints, Image, Ints
 from ifsvideo.video.picture import Picture
 
-_LAGS_S = (0.07, 0.13, 0.2)
-"""Seconds between the pictures that are compared: so few that neither object nor ground changes its looks,
-several, so that in one of them the two have parted."""
-_RADIUS = 1
-"""Half side of the patch less half a pixel: 3x3 pixels, for points 2 px off the outline. As KLT's window it
-is a fixed number of pixels of the picture that is tracked."""
-_BLUR = 0.7
-"""Standard deviation of the smoothing, pixels: takes out noise and the error of sampling between pixels."""
-_PARTED = 2.0
-"""Farther than this, pixels, object and ground must have parted; nearer, their patches overlap."""
-_REACH = 44.0
-"""Farthest that the ground's nearest track may be, pixels of a 640x480 picture: farther off the ground may
-move otherwise, and where it has no texture there is nothing to compare."""
-_NEIGHBOURS = 6
-"""Tracks of the ground whose median motion is taken; even."""
-_LEAST_GROUND = 8
-"""Fewest tracks of the ground that two frames must share."""
-_LEAST_ROWS = 3
-"""Fewest observations by which a track is judged."""
-_FEW_ROWS = 4.0
-"""Observations at which half of the ratio above one is asked for: few tell that the ground fits better, not
-that it fits as well."""
-_NOISE = 1.0
-"""Misfit, grey levels, that noise alone leaves: where neither side's is larger, nothing can be told. Added to
-both, so that two small ones count as nearly equal."""
+_LAGS_S = tuple(frames / 30 for frames in (1, 2, 3, 4, 6, 8, 10))
+"""Seconds between the frame that is looked at and those that are compared with it: the shortest in which
+object and ground part, before their looks change; at most so long."""
+_COMPARED = 2
+"""Frames that are compared, on each side."""
+_GROWTH, _MARGIN = 0.2, 10.0
+"""How far beyond its tracks an object may reach, share of their box and pixels. With half of the box false
+objects spread over what moves nearly alike."""
+_SMALLEST = 8
+"""Least side of a view, pixels: in a smaller one there is no outline."""
+_SELDOM_S, _OFTEN_S = 0.134, 0.067
+"""Longest and shortest time between two looks at an object, seconds."""
+_LOST = 0.22
+"""Share of an object's tracks that may have ended since the last look: so each track is asked some four times
+in its life."""
+_STANDS = 1.0
+"""How far the ground's typical track goes at most over the longest of these times before a camera that
+stands, pixels."""
 
 
 class _Seen:
-    """A frame among the last few: its points, and the least misfit to either side so far."""
+    """A frame among the last: its points, in pixels of the picture as it is tracked, and what they are."""
 
-    def __init__(self, picture: Picture, points: FramePoints, labels: Ints, scale: float) -> None:
+    def __init__(
+        self, picture: Picture, points: FramePoints, labels: Ints, ground: Bools, guessed: Bools, scale: float
+    ) -> None:
         self.points = points
-        self.moving = labels > BACKGROUND
-        self.ground = labels == BACKGROUND
-        self.to_object = np.full(len(labels), np.inf, np.float32)
-        self.to_ground = np.full(len(labels), np.inf, np.float32)
+        self.labels, self.ground, self.guessed = labels, ground, guessed
         self._picture = picture
         self._scale = scale
 
+    # Made when first asked for: where nothing moves, nobody does.
     @cached_property
-    def looks(self) -> tuple[Image, NDArray[np.float64]]:
-        """The picture as it is compared, and its pixels per pixel of the coordinates along x and y.
-
-        Made when first asked for: where nothing moves, nobody does.
-        """
+    def grey(self) -> Image:
+        """(H, W) the picture in the size in which it is tracked."""
         grey = self._picture.grey
         height, width = grey.shape
-        small = shrunk(grey, *tracked_size(width, height, self._scale))
-        scale = np.array(small.shape[::-1]) / grey.shape[::-1]
-        return np.asarray(cv2.GaussianBlur(small, (0, 0), _BLUR), np.uint8), scale
+        return shrunk(grey, *tracked_size(width, height, self._scale))
+
+    @cached_property
+    def _per_pixel(self) -> NDArray[np.float64]:
+        """Pixels of this size per pixel of the coordinates, along x and y."""
+        return np.array(self.grey.shape[::-1]) / self._picture.size
+
+    @property
+    def rgb(self) -> Image:
+        """(H, W, 3) the colours, in that size."""
+        rgb = self._picture.rgb
+        height, width = self.grey.shape
+        same = rgb.shape[:2] == (height, width)
+        return rgb if same else np.asarray(cv2.resize(rgb, (width, height)), np.uint8)
+
+    @property
+    def xy(self) -> NDArray[np.float32]:
+        """(N, 2) the points."""
+        return self._scaled(self.points.xy)
+
+    def of(self, ids: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Where tracks are (M, 2); NaN where one is not seen."""
+        return self._scaled(self.points.positions(ids))
+
+    def _scaled(self, xy: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.asarray((xy + 0.5) * self._per_pixel - 0.5, np.float32)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """When an object was looked at last, and the tracks (T,) that it had."""
+
+    place: int
+    tracks: NDArray[np.int64]
 
 
 class FigureGround:
-    """Compares, frame by frame, what tracks called moving look like with what object and ground would show.
+    """Looks every few frames which tracks lie on an object's silhouette, and lets these looks vote.
 
-    Of the frames only the last few are kept, of every observation in them the least misfit to either side,
-    and of every track the sums of these.
+    Tracks that move with an object but lie beside it are background. Tracks of which no window could decide,
+    for they were seen too shortly, join the object on which they lie.
+
+    Of the frames only the last few are kept, and of every track the votes.
 
     Parameters
     ----------
@@ -97,110 +118,186 @@ class FigureGround:
 
         check = FigureGround()
         for picture, points, labels in frames:
-            check.add(picture, points, labels)
-        off = np.isin(points.ids, check.on_ground(1.65))
+            check.add(picture, points, labels, labels == 0, guessed)
+        check.finish()
+        labels = check.corrected(points.ids, labels, guessed)
     """
 
     def __init__(self, scale: float = 1.0, fps: float | None = None) -> None:
+        rate = fps or 30.0
         self._scale = scale
-        self.lags = tuple(sorted({max(1, round(lag * (fps or 30.0))) for lag in _LAGS_S}))
-        """The same in frames."""
-        self._recent: deque[_Seen] = deque(maxlen=self.lags[-1] + 1)
-        self._ids = np.empty(0, np.int64)
-        self._sums = np.empty((0, 3))
-        """Of each of these tracks: rows, and the sums of the roots of their misfits to object and ground."""
+        self.lags = parting.lags(rate, _LAGS_S)
+        """Frames between two pictures that are compared."""
+        self._seldom, self._often = _SELDOM_S * rate, _OFTEN_S * rate
+        self._recent: deque[_Seen] = deque(maxlen=2 * self.lags[-1] + 1)
+        self._frames = 0
+        self._looks: dict[int, _Look] = {}
+        self._stays: Counter[tuple[int, int]] = Counter()
+        self._joins: Counter[tuple[int, int]] = Counter()
+        """Of each track and object: looks in which it lay there, less those in which it did not; first of
+        those that have the object's label, then of the others."""
 
-    def add(self, picture: Picture, points: FramePoints, labels: Ints) -> None:
-        """Take the next frame.
+    def add(self, picture: Picture, points: FramePoints, labels: Ints, ground: Bools, guessed: Bools) -> None:
+        """Take the next frame; looks at the one in the middle of those that are kept.
 
         Parameters
         ----------
         picture : Picture, in the size of the coordinates.
         points : FramePoints, ordered by id.
         labels : (N,) int
-            0 background, 1, 2, ... moving.
+            0 background, 1, 2, ... moving, -1 undecided.
+        ground : (N,) bool
+            Which tracks show how the ground moves.
+        guessed : (N,) bool
+            Which were seen so shortly that they only follow their neighbours' labels.
         """
-        if len(self._recent) == self._recent.maxlen:
-            self._ids, self._sums = self._with_rows_of([self._recent[0]])
-        self._recent.append(_Seen(picture, points, labels, self._scale))
-        for lag in self.lags:
-            if lag < len(self._recent):
-                _compare(self._recent[-1 - lag], self._recent[-1])
+        self._recent.append(_Seen(picture, points, labels, ground, guessed, self._scale))
+        self._frames += 1
+        if self._frames > self.lags[-1]:
+            self._look(self._frames - 1 - self.lags[-1])
 
-    def on_ground(self, least_ratio: float) -> NDArray[np.int64]:
-        """Tracks (T,), ordered, that were called moving but show the ground.
+    def finish(self) -> None:
+        """Look at the last frames too: no more will come."""
+        for place in range(max(0, self._frames - self.lags[-1]), self._frames):
+            self._look(place)
 
-        A track is judged by the mean over its rows so far of the square root of the misfits: rows in which
-        both sides are covered count little then. It shows the ground unless the ground fits ``least_ratio``
-        times worse than the object. Where nothing can be told, it is not among them: it was compared too
-        seldom, or is so plain that both sides fit.
+    def corrected(self, ids: NDArray[np.int64], labels: Ints, guessed: Bools) -> NDArray[np.int64]:
+        """Labels (N,) of some observations by all looks so far.
+
+        Parameters
+        ----------
+        ids : (N,) int64
+            Their tracks.
+        labels : (N,) int
+        guessed : (N,) bool
         """
-        ids, sums = self._with_rows_of(list(self._recent))
-        rows = sums[:, 0]
-        to_object, to_ground = np.square(sums[:, 1:] / np.maximum(rows, 1)[:, None]).T
-        can_tell = (rows >= _LEAST_ROWS) & (np.maximum(to_object, to_ground) > _NOISE)
-        ratio = 1 + (least_ratio - 1) * rows / (rows + _FEW_ROWS)
-        shows_ground = can_tell & (to_ground + _NOISE < ratio * (to_object + _NOISE))
-        return np.asarray(ids[shows_ground], np.int64)
+        result = labels.astype(np.int64)
+        beside: dict[int, list[int]] = {}
+        for (track, number), vote in self._stays.items():
+            if vote < 0:
+                beside.setdefault(number, []).append(track)
+        for number, tracks in beside.items():
+            result[(labels == number) & np.isin(ids, tracks)] = BACKGROUND
+        joined = {track: number for (track, number), vote in self._joins.items() if vote > 0}
+        if joined:
+            free = np.flatnonzero(guessed & (labels <= BACKGROUND) & np.isin(ids, list(joined)))
+            result[free] = [joined[track] for track in ids[free].tolist()]
+        return result
 
     def forget(self, gone: NDArray[np.int64]) -> None:
         """Drop what is known of some tracks (T,) that have ended; one that comes again is a new one."""
-        kept = ~np.isin(self._ids, gone, assume_unique=True)
-        self._ids, self._sums = self._ids[kept], self._sums[kept]
+        ended = set(gone.tolist())
+        for votes in (self._stays, self._joins):
+            for key in [key for key in votes if key[0] in ended]:
+                del votes[key]
 
-    def _with_rows_of(self, frames: Sequence[_Seen]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Tracks and their sums, with what these frames tell of them."""
-        ids, sums = [self._ids], [self._sums]
-        for frame in frames:
-            judged = np.isfinite(frame.to_object)
-            roots = np.sqrt([frame.to_object[judged], frame.to_ground[judged]])
-            ids.append(frame.points.ids[judged])
-            sums.append(np.vstack([np.ones(roots.shape[1]), roots]).T)
-        names, track = np.unique(np.concatenate(ids), return_inverse=True)
-        total = np.zeros((len(names), 3))
-        np.add.at(total, track, np.concatenate(sums))
-        return names, total
+    def _look(self, place: int) -> None:
+        """Look at the objects in a frame that have not been looked at for long."""
+        here = self._recent[place - self._frames]
+        if not (here.labels > BACKGROUND).any() or self._camera_stands(here):
+            return
+        looks = {}
+        for number in np.unique(here.labels[here.labels > BACKGROUND]).tolist():
+            look = self._looks.get(number)
+            tracks = here.points.ids[here.labels == number]
+            if look is None or self._is_due(look, place, tracks):
+                look = _Look(place, tracks)
+                self._look_at(here, number, place)
+            looks[number] = look
+        self._looks = looks
+
+    def _camera_stands(self, here: _Seen) -> bool:
+        """Whether the ground keeps its place.
+
+        Then what lies on it stands by itself; and who walks before it moves his limbs otherwise than himself,
+        so that his silhouette would not hold them.
+        """
+        ids, xy = here.points.ids[here.ground], here.points.xy[here.ground]
+        for other in (self._recent[0], self._recent[-1]):
+            step = np.linalg.norm(other.points.positions(ids) - xy, axis=1)
+            if np.isfinite(step).any() and np.nanmedian(step) > _STANDS:
+                return False
+        return True
+
+    def _is_due(self, look: _Look, place: int, tracks: NDArray[np.int64]) -> bool:
+        since = place - look.place
+        if since >= self._seldom:
+            return True
+        left = np.count_nonzero(np.isin(look.tracks, tracks, assume_unique=True))
+        return since >= self._often and bool(left < (1 - _LOST) * len(look.tracks))
+
+    def _look_at(self, here: _Seen, number: int, place: int) -> None:
+        """Find the silhouette of an object in a frame, and count the votes of the tracks round it."""
+        xy, own = here.xy, here.labels == number
+        height, width = here.grey.shape
+        view = View.around(xy[own], _GROWTH, _MARGIN, (width, height))
+        motions = Motions(view, xy, own, here.ground, math.hypot(width, height) / 800)
+        if not motions.known or min(view.width, view.height) < _SMALLEST:
+            return
+        sides = [self._parted(motions, here.points.ids, place, way) for way in (-1, 1)]
+        if not any(sides):
+            return
+        silhouette = find_silhouette(view, here.grey, here.rgb, [[one for one, _ in side] for side in sides])
+        rows = np.flatnonzero(view.contains(xy))
+        on = _lies_on(silhouette, view, xy[rows])
+        tracks = here.points.ids[rows].tolist()
+        for k in np.flatnonzero(own[rows]).tolist():
+            self._stays[tracks[k], number] += 1 if on[k] else -1
+        free = np.flatnonzero((here.guessed & (here.labels <= BACKGROUND))[rows])
+        along = _go_along(rows[free], xy, view, [pair for side in sides for pair in side])
+        for k, goes in zip(free.tolist(), (on[free] & along).tolist(), strict=True):
+            self._joins[tracks[k], number] += 1 if goes else -1
+
+    def _parted(
+        self, motions: Motions, ids: NDArray[np.int64], place: int, way: int
+    ) -> list[tuple[Parted, NDArray[np.float32]]]:
+        """The nearest frames before (-1) or after (1) in which object and ground have parted, and where the
+        tracks (N, 2) are there."""
+        found: list[tuple[Parted, NDArray[np.float32]]] = []
+        for lag in self.lags:
+            back = self._frames - (place + way * lag)
+            if not 0 < back <= len(self._recent) or len(found) == _COMPARED:
+                break
+            other = self._recent[-back]
+            there = other.of(ids)
+            flows = motions.to(there)
+            if flows is None:
+                break
+            if have_parted(*flows):
+                found.append((Parted(other.grey, *flows), there))
+        return found
 
 
-def _compare(one: _Seen, other: _Seen) -> None:
-    """Misfits of the moving points of either frame, by what the other shows."""
-    if not (one.moving.any() or other.moving.any()):
-        return
-    place = np.searchsorted(other.points.ids, one.points.ids)
-    row = np.flatnonzero(np.append(other.points.ids, -1)[place] == one.points.ids)
-    _judge(one, other, row, place[row])
-    _judge(other, one, place[row], row)
+def _lies_on(silhouette: Bools, view: View, xy: NDArray[np.float32]) -> Bools:
+    """Whether points (N, 2) in a view lie on a silhouette."""
+    rows, columns = silhouette.shape
+    column, row = np.rint(view.places(xy, columns, rows)).astype(int).T
+    return np.asarray(silhouette[row.clip(0, rows - 1), column.clip(0, columns - 1)], bool)
 
 
-def _judge(here: _Seen, there: _Seen, row: NDArray[np.intp], other: NDArray[np.intp]) -> None:
-    """Misfits of the moving points of frame ``here``, by what frame ``there`` shows; the tracks that both see
-    stand at ``row`` here and at ``other`` there."""
-    ground, moving = here.ground[row], here.moving[row]
-    if np.count_nonzero(ground) < _LEAST_GROUND or not moving.any():
-        return
-    before, scale = here.looks
-    after, _ = there.looks
-    a = (here.points.xy[row] + 0.5) * scale - 0.5
-    b = (there.points.xy[other] + 0.5) * scale - 0.5
-    reach = _REACH * math.hypot(*before.shape) / 800
-    distance, nearest = cKDTree(a[ground], compact_nodes=False, balanced_tree=False).query(
-        a[moving], k=_NEIGHBOURS
-    )
-    # The median of an even number; numpy's own spends most of its time on checks.
-    middle = np.sort((b - a)[ground][nearest], axis=1)[:, _NEIGHBOURS // 2 - 1 : _NEIGHBOURS // 2 + 1]
-    with_ground = a[moving] + middle.mean(axis=1)
-    parted = np.linalg.norm(with_ground - b[moving], axis=1) > _PARTED
-    asked = parted & (np.asarray(distance)[:, 0] <= reach)
-    rows = row[moving][asked]
-    looks = _patches(before, a[moving][asked])
-    for least, place in ((here.to_object, b[moving]), (here.to_ground, with_ground)):
-        misfit = np.abs(_patches(after, place[asked]) - looks).mean(axis=1)
-        least[rows] = np.minimum(least[rows], misfit)
+def _go_along(
+    tracks: NDArray[np.intp],
+    xy: NDArray[np.float32],
+    view: View,
+    others: list[tuple[Parted, NDArray[np.float32]]],
+) -> Bools:
+    """Whether tracks move rather as the object than as the ground; so those do that are seen once."""
+    lead = np.zeros(len(tracks))
+    place = view.places(xy[tracks], NODES, NODES)
+    for parted, there in others:
+        step = there[tracks] - xy[tracks]
+        to_object, to_ground = (
+            np.linalg.norm(step - _at(flow, place), axis=1)
+            for flow in (parted.with_object, parted.with_ground)
+        )
+        lead += np.nan_to_num(to_ground - to_object)
+    return np.asarray(lead >= 0, bool)
 
 
-def _patches(picture: Image, xy: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Pixels (N, 9) round points (N, 2), bilinear between pixels; beyond the border that goes on."""
-    x, y = grid(_RADIUS)
-    # Not cv2.remap: it takes 32766 points at most, and a tracker of one's own may give more.
-    places = [xy[:, 1:] + y, xy[:, :1] + x]
-    return np.asarray(map_coordinates(picture, places, np.float32, order=1, mode="nearest"))
+def _at(flow: Flow, place: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The flow (N, 2) at places (N, 2) in pixels of its nodes, bilinear between them."""
+    if not len(place):
+        return np.empty((0, 2), np.float32)
+    x, y = place[:, :1], place[:, 1:]
+    at = cv2.remap(flow, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(at[:, 0], np.float32)

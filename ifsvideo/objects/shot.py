@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.objects.camera_fixed import CameraFixed
 from ifsvideo.objects.figure_ground import FigureGround
+from ifsvideo.objects.linked import LinkedWindow
 from ifsvideo.objects.linking import Linker
 from ifsvideo.objects.numbering import Numbers
 from ifsvideo.objects.still_objects import still_objects
 from ifsvideo.objects.windows import Bounds, WindowLabels, Windows, WindowSize, gather, long_enough
-from ifsvideo.types import BACKGROUND, UNDECIDED, FramePoints, Tracks
+from ifsvideo.types import BACKGROUND, UNDECIDED, Bools, FramePoints, Tracks
 from ifsvideo.video.picture import Picture
 
 
@@ -54,6 +55,8 @@ class Frame:
         How often it is shown, one time after the other.
     labels : (N,) int
         Final once the frame comes out of a `Shot`.
+    guessed : (N,) bool
+        Whether the window that labels the frame could not decide of the point's track: it is too short.
     """
 
     place: int
@@ -61,6 +64,7 @@ class Frame:
     picture: Picture | None = None
     shown: int = 1
     labels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    guessed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
 
 
 @dataclass(frozen=True)
@@ -123,8 +127,10 @@ class Shot:
         self._gone = 0
         """Frames that came out; the first of the others has this number in the shot."""
         self._under_way: deque[_Window] = deque()
-        self._linked: deque[tuple[Bounds, NDArray[np.int64], NDArray[np.int64]]] = deque()
-        """Windows that are linked, the ids of their tracks and the labels of these."""
+        self._linked: deque[LinkedWindow] = deque()
+        """Windows that are linked and label no frames yet."""
+        self._before: LinkedWindow | None = None
+        """The window before these."""
         self._linked_to = 0
         """End of the last window that is linked."""
         self._blocks: deque[int] = deque()
@@ -156,6 +162,7 @@ class Shot:
             yield from self._take(self._under_way.popleft())
         if self._linked:
             self._prepare(frames)
+        self._borders.finish()
         while self._blocks:
             yield from self._release()
 
@@ -178,35 +185,37 @@ class Shot:
         found = self._linker.link(
             window.tracks, said.labels, decided, said.confidence, start=window.bounds[0], stride=stride
         )
-        self._linked.append((window.bounds, window.tracks.ids, found))
+        self._linked.append(LinkedWindow(window.bounds, window.tracks.ids, found, decided))
         self._linked_to = window.bounds[1]
         if len(self._linked) > 1:
-            self._prepare((self._linked[0][0][1] + self._linked[1][0][0]) // 2)
+            self._prepare((self._linked[0].bounds[1] + self._linked[1].bounds[0]) // 2)
         if len(self._blocks) > 1:
             yield from self._release()
 
     def _prepare(self, stop: int) -> None:
         """Label the frames up to ``stop`` by the first of the linked windows, and look at their borders."""
-        _, ids, found = self._linked.popleft()
+        window = self._linked.popleft()
+        after = self._linked[0] if self._linked else None
         start = self._blocks[-1] if self._blocks else self._gone
         self._blocks.append(stop)
         block = self._frames[start - self._gone : stop - self._gone]
         for frame in block:
-            frame.labels = np.full(len(frame.points.ids), UNDECIDED, dtype=np.int64)
-            known = np.isin(frame.points.ids, ids, assume_unique=True)
-            frame.labels[known] = found[np.searchsorted(ids, frame.points.ids[known])]
+            frame.labels, frame.guessed = window.say_of(frame.points.ids, self._before, after)
+        self._before = window
         if not self._config.check_borders:
             return
-        for frame, labels in zip(block, self._labels_now(block), strict=True):
+        labels, corrected = self._labels_now(block), self._labels_now(block, corrected=True)
+        for frame, plain, better in zip(block, labels, corrected, strict=True):
             if frame.picture is not None:
-                self._borders.add(frame.picture, frame.points, labels)
+                # Neither what is called moving nor what only seems to is ground.
+                ground = (frame.labels == BACKGROUND) & (better == BACKGROUND)
+                self._borders.add(frame.picture, frame.points, plain, ground, frame.guessed)
 
     def _release(self) -> Iterator[Frame]:
         """The frames of the first block, their labels final."""
         known = self._frames[: self._blocks[-1] - self._gone]
         wanted = self._blocks.popleft() - self._gone
-        on_ground = self._borders.on_ground(self._config.least_ground_misfit)
-        labels = self._labels_now(known, on_ground)
+        labels = self._labels_now(known, corrected=self._config.check_borders)
         unit = float(np.hypot(*self._size)) / 800 if self._size else 1.0
         self._still |= still_objects([frame.points for frame in known], labels, unit, self._config)
         for frame_labels in labels:
@@ -223,13 +232,11 @@ class Shot:
             part.forget(gone)
         yield from known[:wanted]
 
-    def _labels_now(
-        self, frames: Sequence[Frame], on_ground: NDArray[np.int64] | None = None
-    ) -> list[NDArray[np.int64]]:
+    def _labels_now(self, frames: Sequence[Frame], corrected: bool = False) -> list[NDArray[np.int64]]:
         """Labels (N,) of each frame as far as is known by now; objects as the linker numbers them.
 
-        What windows found too seldom or were not sure of is background, and so are tracks that show the
-        ground.
+        What windows found too seldom or were not sure of is background. ``corrected`` takes what lies on an
+        object for that, and what lies beside it for background.
         """
         if not frames:
             return []
@@ -241,9 +248,10 @@ class Shot:
         numbers = np.array([linker.number_of(track) or BACKGROUND for track in tracks.tolist()], np.int64)
         counts = [self._counts(number) for number in numbers.tolist()]
         numbers[~np.array(counts, bool)] = BACKGROUND
-        if on_ground is not None:
-            numbers[np.isin(tracks, on_ground, assume_unique=True)] = BACKGROUND
         labels[moving] = numbers[place]
+        if corrected:
+            guessed = np.concatenate([frame.guessed for frame in frames])
+            labels = self._borders.corrected(ids, labels, guessed)
         labels[np.isin(ids, self._fixed_ids)] = UNDECIDED
         return np.split(labels, np.cumsum([len(frame.labels) for frame in frames])[:-1])
 

@@ -63,6 +63,12 @@ class Picture:
         return packed
 
     @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), pixels."""
+        height, width = self.pixels.shape[:2]
+        return width, height if self.pixels.ndim == 3 else height * 2 // 3
+
+    @property
     def rgb(self) -> Image:
         """(H, W, 3) uint8, made anew from planes."""
         pixels = self.pixels

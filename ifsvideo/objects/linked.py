@@ -1,0 +1,56 @@
+"""What a window says of the points of frames, once its objects are numbered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.objects.windows import Bounds
+from ifsvideo.types import BACKGROUND, UNDECIDED, Bools
+
+
+@dataclass(frozen=True)
+class LinkedWindow:
+    """A window whose labels are the clip's numbers.
+
+    Attributes
+    ----------
+    bounds : (first, one past the last) frame
+    ids : (P,) int64, ordered
+        Its tracks.
+    labels : (P,) int64
+        0 background, 1, 2, ... moving, -1 undecided.
+    decided : (P,) bool
+        Whether the window has decided of the track; the others follow their neighbours.
+    """
+
+    bounds: Bounds
+    ids: NDArray[np.int64]
+    labels: NDArray[np.int64]
+    decided: Bools
+
+    def say_of(
+        self, ids: NDArray[np.int64], before: LinkedWindow | None, after: LinkedWindow | None
+    ) -> tuple[NDArray[np.int64], Bools]:
+        """Labels of points (N,) by their tracks (N,), and whether these are but guessed.
+
+        What moves in the windows before and after moves in between, too: an object stands for half a window
+        less often than a window takes it for the world, and all else for an object.
+        """
+        labels, decided = self._find(ids)
+        if before is not None and after is not None:
+            first, was_decided = before._find(ids)
+            second, is_decided = after._find(ids)
+            goes_on = (first > BACKGROUND) & (first == second) & was_decided & is_decided
+            labels = np.where(goes_on & (labels <= BACKGROUND), first, labels)
+        return labels, ~decided
+
+    def _find(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools]:
+        """Labels (N,) of tracks, -1 of those that the window has not, and whether it has decided of them."""
+        known = np.isin(ids, self.ids, assume_unique=True)
+        place = np.searchsorted(self.ids, ids[known])
+        labels, decided = np.full(len(ids), UNDECIDED, dtype=np.int64), np.zeros(len(ids), dtype=bool)
+        labels[known], decided[known] = self.labels[place], self.decided[place]
+        return labels, decided

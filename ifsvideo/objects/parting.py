@@ -1,0 +1,117 @@
+"""When an object and the ground behind it have parted: their motions from frame to frame, over a view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ifsvideo.objects.silhouette import Flow, View
+from ifsvideo.types import Bools
+
+NODES = 5
+"""Nodes of a flow along each side of a view."""
+_PARTED = 2.0
+"""How far the typical node must have parted, pixels: so far the middle of an edge is clear of its blur."""
+_LEAST_POINTS = 3
+"""Fewest tracks of the object that two frames must share."""
+_LEAST_GROUND = 8
+"""Fewest tracks of the ground that two frames must share."""
+_NEIGHBOURS = 6
+"""Tracks of the ground whose median motion is that of a node; even."""
+_REACH = 44.0
+"""Farthest that the ground's nearest track may be from the typical node on the view's rim, pixels of a
+640x480 picture: farther off the ground may move otherwise."""
+_FEW = 6
+"""Fewest tracks to which more than one common step is fitted."""
+_FITS = 3
+"""Weighted least squares in a row, each with weights by the misfits of the one before."""
+_NO_MISFIT = 0.3
+"""Misfit of a track, pixels, that is as good as none: KLT's own error."""
+
+Array = NDArray[np.float64]
+
+
+class Motions:
+    """The motions of an object and of the ground round it, from one frame to any other.
+
+    Parameters
+    ----------
+    view : View
+    xy : (N, 2) float
+        Tracks in the frame that is looked at, pixels.
+    own, ground : (N,) bool
+        Which are the object's, and which the ground's.
+    unit : float
+        Pixels per pixel of a 640x480 picture.
+    """
+
+    def __init__(self, view: View, xy: NDArray[np.float32], own: Bools, ground: Bools, unit: float) -> None:
+        self._xy = xy
+        self._nodes = view.nodes(NODES, NODES)
+        self._own, self._ground = np.flatnonzero(own), np.flatnonzero(ground)
+        self.known = len(self._own) >= _LEAST_POINTS and len(self._ground) >= _LEAST_GROUND
+        """Whether there are tracks enough, near enough."""
+        if self.known:
+            asked = min(2 * _NEIGHBOURS, len(self._ground))
+            distance, near = cKDTree(xy[self._ground]).query(self._nodes, k=asked)
+            self._near = np.asarray(near, np.int64)
+            rim = np.ones((NODES, NODES), bool)
+            rim[1:-1, 1:-1] = False
+            self.known = bool(np.median(np.asarray(distance)[rim.ravel(), 0]) <= _REACH * unit)
+
+    def to(self, there: NDArray[np.float32]) -> tuple[Flow, Flow] | None:
+        """Flows of object and ground to the frame in which the tracks are at ``there`` (N, 2), NaN where one
+        is not seen; None where too few are seen in both."""
+        step = np.asarray(there - self._xy, np.float64)
+        own, ground = step[self._own], step[self._ground]
+        seen, seen_ground = np.isfinite(own[:, 0]), np.isfinite(ground[:, 0])
+        if np.count_nonzero(seen) < _LEAST_POINTS or np.count_nonzero(seen_ground) < _LEAST_GROUND:
+            return None
+        with_object = _affine(self._xy[self._own[seen]], own[seen], self._nodes)
+        with_ground = _median(ground[self._near], _NEIGHBOURS)
+        none_near = np.isnan(with_ground[:, 0])
+        with_ground[none_near] = np.median(ground[seen_ground], axis=0)
+        shape = (NODES, NODES, 2)
+        return with_object.reshape(shape).astype(np.float32), with_ground.reshape(shape).astype(np.float32)
+
+
+def have_parted(with_object: Flow, with_ground: Flow) -> bool:
+    """Whether two motions have come so far apart that a pixel can tell them from each other."""
+    return bool(np.median(np.linalg.norm(with_object - with_ground, axis=2)) >= _PARTED)
+
+
+def lags(rate: float, seconds: Iterable[float]) -> tuple[int, ...]:
+    """Times in frames, shortest first, each at least one frame and none twice."""
+    return tuple(sorted({max(1, round(one * rate)) for one in seconds}))
+
+
+def _affine(xy: NDArray[np.float32], step: Array, nodes: NDArray[np.float32]) -> Array:
+    """Steps (M, 2) of nodes by the affine motion of most of the tracks (N, 2), that which is linear in their
+    place held back a little; by the median step where there are few tracks."""
+    usual = np.median(step, axis=0)
+    if len(xy) < _FEW:
+        return np.broadcast_to(usual, nodes.shape).copy()
+    centre, spread = xy.mean(axis=0), max(float(xy.std(axis=0).max()), 1.0)
+    place = np.column_stack([(xy - centre) / spread, np.ones(len(xy))])
+    misfit = np.linalg.norm(step - usual, axis=1)
+    for _ in range(_FITS):
+        typical = max(_NO_MISFIT, 1.5 * float(np.median(misfit)))
+        weighted = place / (1 + (misfit / typical) ** 2)[:, None]
+        motion = np.linalg.solve(weighted.T @ place + np.diag([0.5, 0.5, 1e-6]), weighted.T @ (step - usual))
+        misfit = np.linalg.norm(step - usual - place @ motion, axis=1)
+    there = np.column_stack([(nodes - centre) / spread, np.ones(len(nodes))])
+    return np.asarray(usual + there @ motion)
+
+
+def _median(steps: Array, first: int) -> Array:
+    """Median (M, 2) of the first so many of the steps (M, K, 2) that are not NaN; NaN where there is none."""
+    seen = np.isfinite(steps[..., 0])
+    seen &= np.cumsum(seen, axis=1) <= first
+    count = np.count_nonzero(seen, axis=1)
+    ordered = np.sort(np.where(seen[..., None], steps, np.inf), axis=1)
+    row = np.arange(len(steps))
+    middle = (ordered[row, np.maximum(count - 1, 0) // 2] + ordered[row, count // 2]) / 2
+    return np.where(count[:, None] > 0, middle, np.nan)

@@ -1,0 +1,189 @@
+"""The silhouette of an object: which pixels near it move as it does, and which with the ground behind it.
+
+A pixel of the object looks in another frame like the place to which the object has carried it, a pixel of the
+ground like the place to which the ground has gone. What is covered or uncovered meanwhile looks like neither;
+but an outline covers on one side only of the time at which it is looked at, so frames before and after are
+asked and the better side counts. Where object and ground are plain both fit; there GrabCut decides, by the
+colours of what is told and by where the picture has edges (Rother et al., GrabCut, SIGGRAPH 2004).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.types import Bools, Image
+
+_PIXELS = 10_000
+"""Most pixels of a view; a larger box is looked at in fewer. With 5000 outlines are less exact, with 30000
+little more exact and three times as slow (`ifsvideo/benchmark/TRIED.md`)."""
+_BLUR = 0.7
+"""Standard deviation of the smoothing, pixels of the view: takes out noise and the error of sampling between
+pixels."""
+_NOISE = 1.5
+"""Misfit, grey levels, that noise alone leaves; added to both, so that two small ones count as equal."""
+_SURE = 0.9
+"""Logarithm of the ratio of misfits from which on a pixel is told: one fits 2.5 times better."""
+_BESIDE = np.ones((3, 3), np.uint8)
+"""Pixels over which misfits are averaged. One that is told must have all of these told alike: next to an
+outline they lie on both sides of it."""
+
+Flow = NDArray[np.float32]
+"""(R, C, 2) how far nodes of a view go, evenly spaced over it as the pixels of a small picture, pixels."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A box of the picture, and the pixels in which it is looked at.
+
+    Attributes
+    ----------
+    left, top, width, height : int
+        Pixels of the picture.
+    columns, rows : int
+        Pixels of the view.
+    """
+
+    left: int
+    top: int
+    width: int
+    height: int
+    columns: int
+    rows: int
+
+    @classmethod
+    def around(cls, xy: NDArray[np.float32], growth: float, margin: float, size: tuple[int, int]) -> View:
+        """The box of points (N, 2), larger on every side by ``growth`` times its size and by a margin, as far
+        as the picture of ``size`` (width, height) goes."""
+        low, high = xy.min(axis=0), xy.max(axis=0)
+        grown = growth * (high - low) + margin
+        left, top = np.clip(np.floor(low - grown), 0, np.array(size) - 1).astype(int).tolist()
+        right, bottom = np.clip(np.ceil(high + grown), 0, np.array(size) - 1).astype(int).tolist()
+        width, height = right + 1 - left, bottom + 1 - top
+        scale = min(1.0, (_PIXELS / (width * height)) ** 0.5)
+        return cls(left, top, width, height, max(1, round(width * scale)), max(1, round(height * scale)))
+
+    def nodes(self, columns: int, rows: int) -> NDArray[np.float32]:
+        """Places (rows * columns, 2) in the picture, spaced as the pixels of a view of this size."""
+        x = self.left + (np.arange(columns) + 0.5) * self.width / columns - 0.5
+        y = self.top + (np.arange(rows) + 0.5) * self.height / rows - 0.5
+        return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2).astype(np.float32)
+
+    def contains(self, xy: NDArray[np.float32]) -> Bools:
+        """Whether points (N, 2) of the picture lie in the box."""
+        x, y = (np.rint(xy) - [self.left, self.top]).T
+        return np.asarray((x >= 0) & (y >= 0) & (x < self.width) & (y < self.height), bool)
+
+    def places(self, xy: NDArray[np.float32], columns: int, rows: int) -> NDArray[np.float32]:
+        """Points (N, 2) of the picture in pixels of a view of this size."""
+        scale = np.array([columns / self.width, rows / self.height])
+        return np.asarray((xy - [self.left, self.top] + 0.5) * scale - 0.5, np.float32)
+
+    def cut(self, picture: Image, margin: int = 0) -> tuple[Image, NDArray[np.float32]]:
+        """The box of a picture, larger by a margin, in pixels of the view, and where (2,) the view's first
+        pixel lies in it."""
+        height, width = picture.shape[:2]
+        left, top = max(0, self.left - margin), max(0, self.top - margin)
+        right = min(width, self.left + self.width + margin)
+        bottom = min(height, self.top + self.height + margin)
+        scale = np.array([self.columns / self.width, self.rows / self.height])
+        columns, rows = np.maximum(1, np.rint([right - left, bottom - top] * scale)).astype(int).tolist()
+        piece = picture[top:bottom, left:right]
+        if (rows, columns) != piece.shape[:2]:
+            piece = np.asarray(cv2.resize(piece, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
+        # The piece has whole pixels: its own scale is not exactly the view's.
+        own = np.array([columns / (right - left), rows / (bottom - top)])
+        first = (np.array([self.left - left, self.top - top]) + 0.5 / scale) * own - 0.5
+        return np.ascontiguousarray(piece), np.asarray(first, np.float32)
+
+
+@dataclass(frozen=True)
+class Parted:
+    """Another frame, in which object and ground have parted.
+
+    Attributes
+    ----------
+    grey : (H, W) uint8
+        The whole picture.
+    with_object, with_ground : Flow
+        To there from the frame that is looked at.
+    """
+
+    grey: Image
+    with_object: Flow
+    with_ground: Flow
+
+
+def find_silhouette(view: View, grey: Image, rgb: Image, sides: Sequence[Sequence[Parted]]) -> Bools:
+    """Whether each pixel of a view (rows, columns) belongs to the object.
+
+    Parameters
+    ----------
+    view : View
+    grey, rgb : (H, W), (H, W, 3) uint8
+        The picture that is looked at.
+    sides : sequence of sequences of Parted
+        Frames before, and frames after; one of them may have none.
+    """
+    log_ratio = _log_ratio(view, grey, sides)
+    told = np.full(log_ratio.shape, cv2.GC_PR_BGD, np.uint8)
+    told[log_ratio > 0] = cv2.GC_PR_FGD
+    border = np.ones(told.shape, bool)
+    border[1:-1, 1:-1] = False
+    told[border & (log_ratio <= 0)] = cv2.GC_BGD
+    told[cv2.erode((log_ratio > _SURE).astype(np.uint8), _BESIDE) > 0] = cv2.GC_FGD
+    told[cv2.erode((log_ratio < -_SURE).astype(np.uint8), _BESIDE) > 0] = cv2.GC_BGD
+    figure: Bools = told % 2 == 1
+    if figure.all() or not figure.any():
+        return figure
+    # It draws the first centres of its colours at random.
+    cv2.setRNGSeed(0)
+    colours = np.zeros((2, 1, 65))
+    cv2.grabCut(view.cut(rgb)[0], told, (0, 0, 1, 1), colours[0], colours[1], 1, cv2.GC_INIT_WITH_MASK)
+    # Where the picture is all edges GrabCut's outline may lie beside them: what is told stands.
+    return np.asarray((told % 2 == 1) & (log_ratio > -_SURE), bool)
+
+
+def _log_ratio(view: View, grey: Image, sides: Sequence[Sequence[Parted]]) -> NDArray[np.float32]:
+    """Logarithm (rows, columns) of the misfit to the ground over that to the object; 0 where none is seen."""
+    here = _smooth(view.cut(grey)[0])
+    least = np.full((2, view.rows, view.columns), np.inf, np.float32)
+    for side in sides:
+        if side:
+            np.minimum(least, np.mean([_misfits(view, here, other) for other in side], axis=0), out=least)
+    ratio = np.zeros(least.shape[1:], np.float32)
+    seen = np.isfinite(least).all(axis=0)
+    ratio[seen] = np.log((least[1, seen] + _NOISE) / (least[0, seen] + _NOISE))
+    return ratio
+
+
+def _smooth(grey: Image) -> Image:
+    return np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR), np.uint8)
+
+
+def _misfits(view: View, here: Image, other: Parted) -> NDArray[np.float32]:
+    """Misfit (2, rows, columns), grey levels, of each pixel to what another frame shows where the object, and
+    where the ground would have carried it; infinite where one of these is outside the picture."""
+    flows = [cv2.resize(flow, (view.columns, view.rows)) for flow in (other.with_object, other.with_ground)]
+    height, width = other.grey.shape
+    farthest = min(float(np.abs(flows).max()), float(max(height, width)))
+    there, first = view.cut(other.grey, int(farthest) + 2)
+    there = _smooth(there)
+    scale = np.array([view.columns / view.width, view.rows / view.height], np.float32)
+    pixels = np.stack(np.meshgrid(np.arange(view.columns), np.arange(view.rows)), axis=-1).astype(np.float32)
+    corner = (np.array([view.left, view.top]) + 0.5) * scale - 0.5
+    last = (np.array([width, height]) - 0.5) * scale - 0.5
+    outside = np.zeros(here.shape, bool)
+    misfits = np.empty((2, *here.shape), np.float32)
+    for flow, misfit in zip(flows, misfits, strict=True):
+        place = pixels + flow * scale
+        outside |= ((place + corner < -0.5) | (place + corner > last)).any(axis=2)
+        x, y = np.moveaxis(place + first, 2, 0)
+        shown = cv2.remap(there, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        misfit[:] = cv2.blur(cv2.absdiff(shown, here).astype(np.float32), _BESIDE.shape)
+    misfits[:, outside] = np.inf
+    return misfits

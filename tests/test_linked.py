@@ -1,0 +1,37 @@
+"""What linked windows say of points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ifsvideo.objects.linked import LinkedWindow
+
+IDS = np.array([2, 3, 5, 8])
+
+
+def window(labels: list[int], decided: list[bool] | None = None, ids: np.ndarray = IDS) -> LinkedWindow:
+    sure = np.ones(len(labels), bool) if decided is None else np.array(decided)
+    return LinkedWindow((0, 30), ids, np.array(labels), sure)
+
+
+def test_points_have_the_labels_of_their_tracks_and_others_none() -> None:
+    labels, guessed = window([0, 1, -1, 2], [True, False, True, True]).say_of(
+        np.array([1, 2, 3, 8, 9]), None, None
+    )
+    assert labels.tolist() == [-1, 0, 1, 2, -1]
+    assert guessed.tolist() == [True, False, True, False, True]
+
+
+def test_what_moves_before_and_after_moves_in_between() -> None:
+    before, between, after = window([1, 1, 1, 0]), window([0, -1, 2, 0]), window([1, 1, 1, 1])
+    assert between.say_of(IDS, before, after)[0].tolist() == [1, 1, 2, 0]
+
+
+def test_neither_side_alone_nor_two_objects_nor_a_guess_is_enough() -> None:
+    between, other = window([0, 0, 0, 0]), window([1, 2, 1, 1])
+    one = window([1, 1, 1, 1], [True, True, False, True])
+    less = window([1, 1, 1], ids=IDS[:3])
+    assert between.say_of(IDS, one, None)[0].tolist() == [0, 0, 0, 0]
+    assert between.say_of(IDS, None, one)[0].tolist() == [0, 0, 0, 0]
+    assert between.say_of(IDS, one, other)[0].tolist() == [1, 0, 0, 1]
+    assert between.say_of(IDS, less, other)[0].tolist() == [1, 0, 1, 0]
