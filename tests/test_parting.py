@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ifsvideo.objects.parting import NODES, Motions, have_parted, lags
+from ifsvideo.objects.parting import NODES, Motions, how_far_parted, lags
 from ifsvideo.objects.silhouette import View
 
 SIZE = (400, 300)
@@ -79,10 +79,9 @@ def test_a_ground_that_is_far_off_tells_nothing() -> None:
     assert Motions(view, xy[near], own[near], ~own[near], 4.0).known
 
 
-def test_two_motions_part_once_they_differ_by_pixels() -> None:
+def test_how_far_two_motions_part() -> None:
     still = np.zeros((NODES, NODES, 2), np.float32)
-    assert not have_parted(still + np.float32([1.9, 0.0]), still)
-    assert have_parted(still + np.float32([1.5, 1.5]), still)
+    assert how_far_parted(still + np.float32([3.0, 4.0]), still) == pytest.approx(5.0)
 
 
 def test_times_in_frames() -> None:

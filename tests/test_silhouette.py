@@ -62,7 +62,7 @@ def overlap(figure: np.ndarray, truth: np.ndarray) -> float:
 
 
 def test_a_textured_shape_before_a_textured_ground() -> None:
-    assert overlap(*found(texture(1), texture(2))) > 0.94
+    assert overlap(*found(texture(1), texture(2))) > 0.92
 
 
 def test_a_plain_shape_is_filled() -> None:
@@ -70,17 +70,16 @@ def test_a_plain_shape_is_filled() -> None:
     assert overlap(*found(texture(1, 30.0, 100.0), texture(2, 2.0, 210.0))) > 0.93
 
 
-def test_one_side_of_the_time_tells_less_well_than_both() -> None:
-    """What the shape covers next, or has covered, looks like neither."""
-    both = overlap(*found(texture(1), texture(2)))
-    for sides in (((-2, -1), ()), ((), (1, 2))):
-        assert 0.85 < overlap(*found(texture(1), texture(2), sides)) < both
+@pytest.mark.parametrize("sides", [((-2, -1), ()), ((), (1, 2))])
+def test_one_side_of_the_time_is_enough(sides) -> None:
+    """At the beginning and at the end of a clip there is no other; what is covered there is less exact."""
+    assert overlap(*found(texture(1), texture(2), sides)) > 0.88
 
 
 def test_a_large_view_is_looked_at_in_fewer_pixels() -> None:
     figure, truth = found(texture(1), texture(2), scale=4)
-    assert figure.size <= 10_300
-    assert overlap(figure, truth) > 0.95
+    assert figure.size <= 7700
+    assert overlap(figure, truth) > 0.92
 
 
 def test_a_shape_that_does_not_move_by_itself_has_none() -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.objects import parting
-from ifsvideo.objects.parting import NODES, Motions, have_parted
+from ifsvideo.objects.parting import NODES, PARTED, Motions, how_far_parted
 from ifsvideo.objects.silhouette import Flow, Parted, View, find_silhouette
 from ifsvideo.tracking.tracker import shrunk, tracked_size
 from ifsvideo.types import BACKGROUND, Bools, FramePoints, Image, Ints
@@ -29,7 +29,9 @@ _LAGS_S = tuple(frames / 30 for frames in (1, 2, 3, 4, 6, 8, 10))
 object and ground part, before their looks change; at most so long."""
 _COMPARED = 2
 """Frames that are compared, on each side."""
-_GROWTH, _MARGIN = 0.2, 10.0
+_ACCELERATION = 0.7
+"""Share of the time that two motions need to part, told by a shorter one, before which it is not tried."""
+_GROWTH, _MARGIN = 0.1, 10.0
 """How far beyond its tracks an object may reach, share of their box and pixels. With half of the box false
 objects spread over what moves nearly alike."""
 _SMALLEST = 8
@@ -254,17 +256,24 @@ class FigureGround:
         """The nearest frames before (-1) or after (1) in which object and ground have parted, and where the
         tracks (N, 2) are there."""
         found: list[tuple[Parted, NDArray[np.float32]]] = []
+        least = 0.0
         for lag in self.lags:
             back = self._frames - (place + way * lag)
             if not 0 < back <= len(self._recent) or len(found) == _COMPARED:
                 break
+            if lag < least:
+                continue
             other = self._recent[-back]
             there = other.of(ids)
             flows = motions.to(there)
             if flows is None:
                 break
-            if have_parted(*flows):
+            parts = how_far_parted(*flows)
+            if parts >= PARTED:
                 found.append((Parted(other.grey, *flows), there))
+            else:
+                # No fit for times in which they cannot have parted yet.
+                least = _ACCELERATION * lag * PARTED / max(parts, 1e-6)
         return found
 
 

@@ -13,7 +13,7 @@ from ifsvideo.types import Bools
 
 NODES = 5
 """Nodes of a flow along each side of a view."""
-_PARTED = 2.0
+PARTED = 2.0
 """How far the typical node must have parted, pixels: so far the middle of an edge is clear of its blur."""
 _LEAST_POINTS = 3
 """Fewest tracks of the object that two frames must share."""
@@ -78,9 +78,9 @@ class Motions:
         return with_object.reshape(shape).astype(np.float32), with_ground.reshape(shape).astype(np.float32)
 
 
-def have_parted(with_object: Flow, with_ground: Flow) -> bool:
-    """Whether two motions have come so far apart that a pixel can tell them from each other."""
-    return bool(np.median(np.linalg.norm(with_object - with_ground, axis=2)) >= _PARTED)
+def how_far_parted(with_object: Flow, with_ground: Flow) -> float:
+    """Distance of two motions at the typical node, pixels; from `PARTED` on a pixel can tell them."""
+    return float(np.median(np.linalg.norm(with_object - with_ground, axis=2)))
 
 
 def lags(rate: float, seconds: Iterable[float]) -> tuple[int, ...]:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ifsvideo.types import Bools, Image
 
-_PIXELS = 10_000
-"""Most pixels of a view; a larger box is looked at in fewer. With 5000 outlines are less exact, with 30000
+_PIXELS = 7500
+"""Most pixels of a view; a larger box is looked at in fewer. With 4000 outlines are less exact, with 20000
 little more exact and three times as slow (`ifsvideo/benchmark/TRIED.md`)."""
 _BLUR = 0.7
 """Standard deviation of the smoothing, pixels of the view: takes out noise and the error of sampling between
@@ -168,22 +168,25 @@ def _smooth(grey: Image) -> Image:
 def _misfits(view: View, here: Image, other: Parted) -> NDArray[np.float32]:
     """Misfit (2, rows, columns), grey levels, of each pixel to what another frame shows where the object, and
     where the ground would have carried it; infinite where one of these is outside the picture."""
-    flows = [cv2.resize(flow, (view.columns, view.rows)) for flow in (other.with_object, other.with_ground)]
     height, width = other.grey.shape
-    farthest = min(float(np.abs(flows).max()), float(max(height, width)))
-    there, first = view.cut(other.grey, int(farthest) + 2)
+    farthest = max(float(np.abs(flow).max()) for flow in (other.with_object, other.with_ground))
+    there, first = view.cut(other.grey, int(min(farthest, max(height, width))) + 2)
     there = _smooth(there)
     scale = np.array([view.columns / view.width, view.rows / view.height], np.float32)
-    pixels = np.stack(np.meshgrid(np.arange(view.columns), np.arange(view.rows)), axis=-1).astype(np.float32)
-    corner = (np.array([view.left, view.top]) + 0.5) * scale - 0.5
-    last = (np.array([width, height]) - 0.5) * scale - 0.5
+    corner = (np.array([view.left, view.top], np.float32) + 0.5) * scale - 0.5
+    last = (np.array([width, height], np.float32) - 0.5) * scale - 0.5
+    column, row = np.arange(view.columns, dtype=np.float32), np.arange(view.rows, dtype=np.float32)[:, None]
     outside = np.zeros(here.shape, bool)
     misfits = np.empty((2, *here.shape), np.float32)
-    for flow, misfit in zip(flows, misfits, strict=True):
-        place = pixels + flow * scale
-        outside |= ((place + corner < -0.5) | (place + corner > last)).any(axis=2)
-        x, y = np.moveaxis(place + first, 2, 0)
-        shown = cv2.remap(there, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        misfit[:] = cv2.blur(cv2.absdiff(shown, here).astype(np.float32), _BESIDE.shape)
+    for flow, misfit in zip((other.with_object, other.with_ground), misfits, strict=True):
+        dx, dy = cv2.split(cv2.resize(flow * scale, (view.columns, view.rows)))
+        x, y = dx + column, dy + row
+        for place, begin, end in ((x, corner[0], last[0]), (y, corner[1], last[1])):
+            if place.min() + begin < -0.5 or place.max() + begin > end:
+                outside |= (place + begin < -0.5) | (place + begin > end)
+        shown = cv2.remap(
+            there, x + first[0], y + first[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        cv2.blur(cv2.absdiff(shown, here).astype(np.float32), _BESIDE.shape, dst=misfit)
     misfits[:, outside] = np.inf
     return misfits
