@@ -85,10 +85,13 @@ class SegmenterConfig:
     shear_ratio: float = 3.0
     """lambda of Algorithm 2: segments are apart if the shear between them exceeds so many times that
     inside."""
-    core_doubt: float = 0.25
+    core_doubt: float = 0.15
     """Probability of being two motions up to which segments merge at first: the widest group is then surely
     static, the world is fitted anew to it alone, and merging starts again. 0 leaves the world as stage 1
     found it."""
+    wider_core_doubt: float = 0.3
+    """The same in that world, by the rule of the last pass: the core that the world is fitted to in the end.
+    0 leaves it at the first one."""
     evidence_threshold: float = 5.0
     """How many times farther than usual in the window a point must be from a static point's way to be as
     likely moving as not."""

@@ -112,7 +112,7 @@ class IFSSegmenter:
             nearness = np.zeros(tracks.points) if world is None else world.nearness
             first = Cues(tracks, anchor, evidence, nearness, unit, config.pairs)
             window = Window(segments, fit < config.outlier_cost, size)
-            cues, joined = in_static_core(first, window, world, learnt().core, config)
+            cues, joined = in_static_core(first, window, world, learnt(), config)
             merging = Agglomeration(cues, learnt().final)
             labels, confidence = merge_and_label(merging, joined, config, motions)
             evidence = cues.evidence
