@@ -107,6 +107,9 @@ class SegmenterConfig:
     gap_doubt: float = 0.3
     """Probability of being two motions up to which parts that a gap cut are one thing all the same, if each
     is believed to move: a lorry and its trailer."""
+    contest: bool = True
+    """Whether a mover may take from the static world what its own motion predicts better
+    (`ifsvideo.segmentation.contest`)."""
 
     def __post_init__(self) -> None:
         for name, values in (("split", ("world", "epipolar")), ("merging", ("evidence", "shear"))):

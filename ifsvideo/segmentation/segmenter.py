@@ -13,6 +13,7 @@ from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.assignment import assign, residuals
 from ifsvideo.segmentation.background import background_first, merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
+from ifsvideo.segmentation.contest import contested
 from ifsvideo.segmentation.cues import Cues
 from ifsvideo.segmentation.epipolar import epipolar_support
 from ifsvideo.segmentation.merging import merge_by_shear
@@ -115,6 +116,10 @@ class IFSSegmenter:
             cues, joined = in_static_core(first, window, world, learnt(), config)
             merging = Agglomeration(cues, learnt().final)
             labels, confidence = merge_and_label(merging, joined, config, motions)
+            if config.contest and world is not None:
+                # 6. What a mover predicts better than the static world does is its own.
+                reach = config.gap * unit
+                labels, confidence = contested(labels, confidence, window, world, cues, reach)
             evidence = cues.evidence
             details |= {"window": window, "joined": joined, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
