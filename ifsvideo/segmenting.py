@@ -67,6 +67,8 @@ class TracksSegmenter:
     has passed most of what it saw at first is no single view, and what is seen too shortly to tell a window's
     motion follows its neighbours.
 
+    One window is segmented several times where that is doubtful (`SegmenterConfig.votes`).
+
     Parameters
     ----------
     config : SegmenterConfig
@@ -84,9 +86,9 @@ class TracksSegmenter:
         """
         segmenter = IFSSegmenter(self.config, self.seed)
         length = None if motions is not None else window_length(tracks, self.config.lasting)
-        return (
-            segmenter.segment(tracks, motions) if length is None else _by_windows(segmenter, tracks, length)
-        )
+        if length is not None:
+            return _by_windows(segmenter, tracks, length)
+        return replace(segmenter, votes=self.config.votes).segment(tracks, motions)
 
 
 def window_length(tracks: Tracks, lasting: float) -> int | None:

@@ -86,8 +86,11 @@ def test_merging_starts_with_the_likeliest_and_stops_at_one_half() -> None:
     assert [merge[:2] for merge in merging.merges] == [(1, 2)]
     assert merging.merges[0][2] == pytest.approx(1 / (1 + (60 / 20) ** 2), rel=1e-6)
     assert [group.members.tolist() for group in groups] == [[0, 1, 2], [9, 10, 11], [3, 4, 5, 6, 7, 8]]
+    # What it doubts most is that the first is another motion, 90 pixels off.
+    assert merging.doubt == pytest.approx(1 / (1 + (90 / 60) ** 2), rel=1e-6)
     merging = Agglomeration(cues, near)
     merging.run(window(np.repeat(np.arange(4), 3)), 1)
+    assert merging.doubt == max(merge[2] for merge in merging.merges) > 0.5
     # The pair becomes number 4; then what is nearest to it, and the result is number 5.
     assert [merge[:2] for merge in merging.merges] == [(1, 2), (0, 4), (3, 5)]
 

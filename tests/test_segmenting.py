@@ -9,7 +9,7 @@ import ifsvideo
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.segmenter import IFSSegmenter
 from ifsvideo.segmenting import TracksSegmenter, window_length
-from ifsvideo.types import Tracks
+from ifsvideo.types import Segmentation, Tracks
 from tests.scenes import LEFT_CAR, SIZE, Camera, Mover, Scene, make_scene, share_wrong
 
 LASTING = SegmenterConfig().lasting
@@ -44,6 +44,30 @@ def test_tracks_that_last_are_one_window() -> None:
     assert np.array_equal(ours.labels, one.labels)
     assert np.array_equal(ours.segments, one.segments)
     assert np.array_equal(ours.confidence, one.confidence)
+
+
+def test_one_window_is_voted_on_and_windows_of_a_drive_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where every run doubts, and none is like another."""
+    made: list[int] = []
+
+    def run(self: IFSSegmenter, tracks: Tracks, *_: object) -> Segmentation:
+        made.append(tracks.points)
+        labels = np.arange(tracks.points) % (1 + len(made))
+        sure, still = np.ones(len(labels)), labels == 0
+        return Segmentation(labels, still, labels, sure, {"doubt": 0.5})
+
+    monkeypatch.setattr(IFSSegmenter, "_stages", run)
+    tracks = make_scene(static=20).tracks
+    for votes, runs in ((5, 5), (1, 1)):
+        made.clear()
+        TracksSegmenter(SegmenterConfig(votes=votes)).segment(tracks)
+        assert len(made) == runs
+    made.clear()
+    short = drive(40, 12).tracks
+    length = window_length(short, LASTING)
+    assert length is not None
+    TracksSegmenter().segment(short)
+    assert len(made) <= 2 * 40 / length + 1
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -70,11 +70,14 @@ class Agglomeration:
     merges : list of (int, int, float)
         Which groups were merged, in order, and how likely they were two; segments count from 0, each merge
         makes the next number.
+    doubt : float
+        How likely the most doubtful decision is wrong: a merge of two motions, or one that is left as two.
     """
 
     cues: Cues
     similarity: Similarity
     merges: list[tuple[int, int, float]] = field(default_factory=list)
+    doubt: float = 0.0
 
     def run(self, window: Window, motions: int | None = None, stop: float = 0.5) -> list[Group]:
         """Merge segments until the best pair is two motions with probability ``stop``, or ``motions`` are
@@ -106,6 +109,8 @@ class Agglomeration:
                 break
             join(pair)
             apart = self._apart(groups, apart)
+        merged = (cost for *_, cost in self.merges[before:])
+        self.doubt = max(self.doubt, *merged, *(1 - cost for cost in apart.values()), 0.0)
         return list(groups.values())
 
     def apart(self, a: Group, b: Group) -> float:

@@ -110,6 +110,9 @@ class SegmenterConfig:
     contest: bool = True
     """Whether a mover may take from the static world what its own motion predicts better
     (`ifsvideo.segmentation.contest`)."""
+    votes: int = 7
+    """How often a sequence that is one window is segmented at most, where that is doubtful
+    (`ifsvideo.segmentation.voting`). A window of a clip is segmented once: the next one overlaps it."""
 
     def __post_init__(self) -> None:
         for name, values in (("split", ("world", "epipolar")), ("merging", ("evidence", "shear"))):

@@ -23,6 +23,7 @@ from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
 from ifsvideo.segmentation.smoothing import smoothed
 from ifsvideo.segmentation.static_core import in_static_core
+from ifsvideo.segmentation.voting import voted
 from ifsvideo.segmentation.world import World, fit_world
 from ifsvideo.types import UNDECIDED, Segmentation, Tracks
 
@@ -36,10 +37,13 @@ class IFSSegmenter:
     config : SegmenterConfig
     seed : int
         Same tracks, configuration and seed: same labels.
+    votes : int
+        How often all stages are run at most (`ifsvideo.segmentation.voting`).
     """
 
     config: SegmenterConfig = field(default_factory=SegmenterConfig)
     seed: int = 0
+    votes: int = 1
 
     def segment(self, tracks: Tracks, motions: int | None = None) -> Segmentation:
         """Label every track.
@@ -63,14 +67,15 @@ class IFSSegmenter:
         confidence = np.zeros(tracks.points)
         details: dict[str, Any] = {}
         if len(usable):
-            part = self._stages(tracks.select(usable), motions)
+            chosen, rng = tracks.select(usable), np.random.default_rng(self.seed)
+            part = voted(lambda: self._stages(chosen, motions, rng), self.votes)
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence
             details = dict(part.details, usable=usable)
         return Segmentation(labels, background, segments, confidence, details)
 
-    def _stages(self, tracks: Tracks, motions: int | None) -> Segmentation:
-        config, rng = self.config, np.random.default_rng(self.seed)
+    def _stages(self, tracks: Tracks, motions: int | None, rng: np.random.Generator) -> Segmentation:
+        config = self.config
         tracks, size = in_a_picture(tracks)
         if config.distortion:
             tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
@@ -121,6 +126,7 @@ class IFSSegmenter:
                 reach = config.gap * unit
                 labels, confidence = contested(labels, confidence, window, world, cues, reach)
             evidence = cues.evidence
+            details["doubt"] = merging.doubt
             details |= {"window": window, "joined": joined, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
         return Segmentation(labels, background, segments, confidence, details)
