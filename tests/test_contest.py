@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -99,3 +103,51 @@ def test_what_was_won_helps_to_win_the_next_part() -> None:
 def test_without_movers_there_is_no_contest(case: Case) -> None:
     labels = np.zeros_like(case.truth)
     assert not case.settled(labels).any()
+
+
+GROUND, FIRST, SECOND, MOVER = (np.arange(start, start + 10) for start in (0, 10, 20, 30))
+
+
+@dataclass(frozen=True)
+class Told:
+    """Worlds whose errors are told: of the first part and the second in the mover's world, once it has the
+    first of the second, of the first in the ground's that it is fitted to, and in the ground's without it."""
+
+    first: float = 0.3
+    second: float = 9.0
+    later: float = 9.0
+    kept: float = 0.3
+    without: float = 0.4
+
+    def fitted_to(self, points: np.ndarray) -> SimpleNamespace:
+        error = np.full(40, 0.2)
+        has_first = FIRST[0] in points
+        if MOVER[0] in points:
+            error[FIRST], error[SECOND] = self.first, self.later if has_first else self.second
+        else:
+            error[FIRST] = self.kept if has_first else self.without
+            error[SECOND] = 0.3 if SECOND[0] in points else 0.4
+        return SimpleNamespace(rms=error, tolerance=np.ones(40))
+
+
+def settled_as_told(told: Told) -> np.ndarray:
+    near = SimpleNamespace(anchor=np.zeros((40, 2)), noise=0.1)
+    near.group = lambda *_: SimpleNamespace(rigid=np.full(40, 0.1))
+    window = Window(np.repeat([0, 1, 2, 3], 10), np.ones(40, dtype=bool), SIZE)
+    labels = np.repeat([0, 0, 0, 1], 10)
+    return contested(labels, np.ones(40), window, cast(World, told), cast(Cues, near), REACH)[0]
+
+
+@pytest.mark.parametrize(
+    ("told", "taken"),
+    [
+        (Told(), [FIRST]),
+        (Told(without=0.25), []),  # the ground that was not fitted to it predicts it better
+        (Told(first=0.6, without=0.7), []),  # worse than a part of the mover can be
+        (Told(kept=0.09), []),  # the ground fits it too well to be in doubt
+        (Told(later=0.3), [FIRST, SECOND]),  # the first part helps to win the second
+    ],
+)
+def test_a_part_goes_where_it_is_predicted_better(told: Told, taken: list[np.ndarray]) -> None:
+    won = np.flatnonzero(settled_as_told(told)[:30])
+    assert won.tolist() == [point for part in taken for point in part]

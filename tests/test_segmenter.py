@@ -226,3 +226,14 @@ def test_coordinates_may_count_from_the_middle_of_the_picture(origin: tuple[floa
     xy = scene.tracks.xy - np.array(origin)
     result = IFSSegmenter().segment(Tracks.from_array(xy, scene.tracks.visible))
     assert share_wrong(result.labels, scene.truth) < 0.05
+
+
+@pytest.mark.parametrize("contest", [True, False])
+def test_movers_may_contest_what_was_merged(monkeypatch: pytest.MonkeyPatch, contest: bool) -> None:
+    def all_of_it(labels: np.ndarray, confidence: np.ndarray, *_: Any) -> tuple[np.ndarray, np.ndarray]:
+        return labels + 1, confidence / 2
+
+    monkeypatch.setattr("ifsvideo.segmentation.segmenter.contested", all_of_it)
+    result = IFSSegmenter(SegmenterConfig(contest=contest)).segment(make_scene(static=40).tracks)
+    assert (result.labels == contest).all()
+    assert (result.confidence == (0.5 if contest else 1)).all()
