@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from ifsvideo.segmentation.agglomeration import Window
-from ifsvideo.segmentation.cues import Cues, Members, median
+from ifsvideo.segmentation.cues import Cues, Members
+from ifsvideo.segmentation.median import median
 from ifsvideo.segmentation.world import World
 from ifsvideo.types import BACKGROUND
 
@@ -70,10 +71,12 @@ def contested(
     movers = [int(group) for group in np.unique(labels) if group > BACKGROUND]
     contest = _Contest(labels.copy(), confidence.copy(), window, world, cues, reach)
     for _ in range(_ROUNDS):
-        won = [contest.settle(*part, movers) for part in window.parts()]
-        if not any(won):
+        winners = {contest.settle(*part, movers) for part in window.parts()} - {BACKGROUND}
+        if not winners:
             break
-        contest.predictions.clear()
+        # A mover that won nothing would be fitted to the same points.
+        for group in winners | {BACKGROUND}:
+            contest.predictions.pop(group, None)
     return contest.labels, contest.confidence
 
 
@@ -93,33 +96,37 @@ class _Contest:
         self.window, self.world, self.cues, self.reach = window, world, cues, reach
         self.predictions: dict[int, _Prediction | None] = {}
 
-    def settle(self, members: Members, reliable: Members, movers: list[int]) -> bool:
-        """Whether a mover wins a segment's points (members, and those that are measured)."""
+    def settle(self, members: Members, reliable: Members, movers: list[int]) -> int:
+        """The mover that wins a segment's points (members, and those that are measured), or the ground."""
         static = self.labels[members] == BACKGROUND
         if 2 * np.count_nonzero(static) <= len(members):
-            return False
+            return BACKGROUND
         part = members[static]
         measured = reliable[self.labels[reliable] == BACKGROUND]
         if len(measured) < _LEAST_PART:
-            return False
+            return BACKGROUND
         claims = [(self._claim(part, measured, mover), mover) for mover in movers]
         error, winner = min(claims, default=(np.inf, BACKGROUND))
         if not error < np.inf or not error < self._without(members, measured):
-            return False
+            return BACKGROUND
         self.confidence[part] = np.median(self.confidence[self.labels == winner])
         self.labels[part] = winner
-        return True
+        return winner
 
     def _claim(self, part: Members, measured: Members, mover: int) -> float:
         """Error of a part in a mover's world; infinite where it has no claim to it."""
         if not self._beside(part, measured, mover):
             return np.inf
-        static, moving = (self._prediction(group) for group in (BACKGROUND, mover))
-        if static is None or moving is None or moving.own > _EXPLAINED:
+        moving = self._prediction(mover)
+        if moving is None or moving.own > _EXPLAINED:
             return np.inf
         error = median(moving.error[measured])
-        most = min(_PREDICTED * moving.own, _RIVAL * median(static.error[measured]))
-        return error if error < most else np.inf
+        if error >= _PREDICTED * moving.own:
+            return np.inf
+        # Last, for most parts are refused by then, and often all: the largest group takes longest to fit.
+        static = self._prediction(BACKGROUND)
+        known = static is not None and error < _RIVAL * median(static.error[measured])
+        return error if known else np.inf
 
     def _beside(self, part: Members, measured: Members, mover: int) -> bool:
         """Whether a part is near a mover, in the picture and among motions."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ifsvideo.segmentation import shear
 from ifsvideo.segmentation.leeway import Leeway
 from ifsvideo.segmentation.lowrank import Subspace, trajectory_matrix
+from ifsvideo.segmentation.median import median
 from ifsvideo.types import Tracks
 
 Array = NDArray[np.float64]
@@ -122,7 +123,7 @@ class Cues:
         asked for tell how noisy tracks are, and what shear is usual inside a segment."""
         found = [self.group(members, reliable) for members, reliable in segments]
         if not self.noise:
-            own = [np.median(g.rigid[g.sample]) for g in found if len(g.sample) >= _LEAST_FOR_NOISE]
+            own = [median(g.rigid[g.sample]) for g in found if len(g.sample) >= _LEAST_FOR_NOISE]
             insides = [g.inside for g in found if np.isfinite(g.inside)]
             self.noise = max(float(np.median(own)) if own else 0.0, _LEAST_NOISE * self.unit)
             self.typical_inside = float(np.median(insides)) if insides else 0.0
@@ -223,14 +224,8 @@ def _depth(a: Group, b: Group) -> float:
 
 
 def _deciles(values: Array) -> Array:
-    """Where a tenth, half and nine tenths of a few values lie below; as of `_median`."""
+    """Where a tenth, half and nine tenths of a few values lie below; as of `median`."""
     ordered, place = np.sort(values), np.array([0.1, 0.5, 0.9]) * (len(values) - 1)
     low = place.astype(np.int64)
     below, above = ordered[low], ordered[np.minimum(low + 1, len(values) - 1)]
     return np.asarray(below + (above - below) * (place - low))
-
-
-def median(values: Array) -> float:
-    """Median of a few values; numpy's own spends ten times as long on its checks."""
-    ordered, middle = np.sort(values), len(values) // 2
-    return float(ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2)

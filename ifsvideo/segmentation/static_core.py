@@ -14,8 +14,9 @@ import numpy as np
 from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.background import static_group
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.cues import Cues, Members, median
+from ifsvideo.segmentation.cues import Cues, Members
 from ifsvideo.segmentation.leeway import Leeway
+from ifsvideo.segmentation.median import median
 from ifsvideo.segmentation.similarity import Rules, Similarity
 from ifsvideo.segmentation.world import World
 
