@@ -76,6 +76,56 @@ class Projection:
     u: Array
 
 
+@dataclass(frozen=True)
+class Freed:
+    """The projections of all points to the first order, where each point may follow the cameras.
+
+    What a point's own place can make up for is what its residuals have in common with three directions of
+    their 2K; of these only the coordinates are kept.
+
+    Attributes
+    ----------
+    free : (C,) int
+        The cameras but the reference.
+    J : (K, 8, 2, P) float
+        Derivatives by each camera and the lens.
+    residual : (K, 2, P) float
+    made_up : (P, 3, N) float
+        Coordinates of the derivatives by all N = 6 C + 2 unknowns.
+    missed : (P, 3) float
+        Coordinates of the residuals.
+    """
+
+    free: NDArray[np.int64]
+    J: Array
+    residual: Array
+    made_up: Array
+    missed: Array
+
+    def information(self, points: NDArray[np.int64], weight: Array) -> tuple[Array, Array]:
+        """What points (n,) of some weight (n,) tell of cameras and lens: matrix (N, N) and gradient (N,) of
+        the normal equations."""
+        matrix, gradient = _normal_equations(
+            self.free, self.J[..., points], self.residual[..., points], weight
+        )
+        root = np.sqrt(weight)[:, None]
+        rows = (self.made_up[points] * root[..., None]).reshape(-1, len(matrix))
+        return matrix - rows.T @ rows, gradient - rows.T @ (self.missed[points] * root).ravel()
+
+    def square(self, points: NDArray[np.int64], step: Array | None = None) -> Array:
+        """Sum of squares (n,) of the residuals of points (n,), after a step (N,) of cameras and lens."""
+        residual, missed = self.residual[..., points], self.missed[points]
+        if step is not None:
+            each = np.zeros((len(self.J), 1, 6 + _GLOBALS))
+            each[self.free, 0, :6] = step[:-_GLOBALS].reshape(-1, 6)
+            each[:, 0, 6:] = step[-_GLOBALS:]
+            J = self.J[..., points]
+            residual = residual + (each @ J.reshape(*J.shape[:2], -1)).reshape(residual.shape)
+            missed = missed + self.made_up[points] @ step
+        left = _square(residual) - np.einsum("pa,pa->p", missed, missed)
+        return np.asarray(np.maximum(left, 0.0))
+
+
 class Bundle:
     """The observations of one window.
 
@@ -231,9 +281,9 @@ class Bundle:
         V += (1e-9 * np.einsum("paa->p", V) + 1e-12)[:, None, None] * np.eye(3)
         return np.asarray(self.tolerance * np.sqrt(self.freedom * np.linalg.inv(V)[:, 2, 2]))
 
-    def without_places(self, e: Estimate, translate: bool) -> tuple[Array, Array]:
-        """Derivatives by cameras and lens (P, 2K, 6 (K - 1) + 2) and residuals (P, 2K) of each point, what
-        its own place can make up for taken off.
+    def without_places(self, e: Estimate, translate: bool) -> Freed:
+        """Residuals and their derivatives by cameras and lens, what each point's own place can make up for
+        taken off.
 
         ``translate=False``: the cameras only turn, all points are far.
         """
@@ -246,18 +296,14 @@ class Bundle:
         # A point that is held as far as it may be cannot go farther.
         farther = np.einsum("kip,kip->p", own[:, 2], residual) > 0
         own[:, 2, :, (e.X[:, 2] <= self.farthest) & farther] = 0.0
-        shared = 6 * len(self._free)
-        rows: Array = np.zeros((len(e.X), len(J), 2, shared + _GLOBALS + 1))
-        for column, k in enumerate(self._free):
-            rows[:, k, :, 6 * column : 6 * column + 6] = J[k, :6].T
-        rows[..., shared:-1] = J[:, 6:].transpose(3, 0, 2, 1)
-        rows[..., -1] = residual.transpose(2, 0, 1)
-        rows = rows.reshape(len(e.X), 2 * len(J), -1)
-        place = own.transpose(3, 0, 2, 1).reshape(len(rows), -1, 3)
-        V = place.transpose(0, 2, 1) @ place
-        V += (1e-9 * np.einsum("paa->p", V) + 1e-12)[:, None, None] * np.eye(3)
-        rows -= place @ np.linalg.solve(V, place.transpose(0, 2, 1) @ rows)
-        return rows[..., :-1], rows[..., -1]
+        V = np.einsum("kaip,kbip->abp", own, own)
+        trace = np.einsum("aap->p", V)
+        for axis in range(3):
+            V[axis, axis] += 1e-9 * trace + 1e-12
+        points = Triangles(V)
+        made_up = points.halfway(self._against_points(J, own))
+        missed = points.halfway(np.einsum("kaip,kip->ap", own, residual))
+        return Freed(self._free, J, residual, np.ascontiguousarray(made_up.transpose(2, 1, 0)), missed.T)
 
     def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array]:
         """Derivatives of the projections by camera (rotation, place) and lens (K, 8, 2, P), and by point
@@ -306,11 +352,8 @@ class Bundle:
         trace = np.einsum("aap->p", V) + 1e-12 * float(weight.max(initial=1.0))
         for axis in range(3):
             V[axis, axis] += (1e-3 * damping + 1e-12) * trace
-        # (shared, 3, P): cameras and lens against points.
-        cross = np.einsum("kcip,kaip->kcap", J, own_heavy)
-        with_cameras = cross[self._free, :6].reshape(-1, *cross.shape[2:])
         points = Triangles(V)
-        half = points.halfway(np.concatenate([with_cameras, cross[:, 6:].sum(axis=0)]))
+        half = points.halfway(self._against_points(J, own_heavy))
         own_half = points.halfway(np.einsum("kaip,kip->ap", own_heavy, residual))
         eliminated = half.reshape(len(half), -1)
         S = U - eliminated @ eliminated.T
@@ -319,21 +362,16 @@ class Bundle:
         own_step = points.rest(-own_half - (shared_step @ eliminated).reshape(own_half.shape))
         return self._moved(e, shared_step, own_step.T, translate)
 
+    def _against_points(self, J: Array, own: Array) -> Array:
+        """Products (shared, 3, P) of the derivatives by cameras and lens with those by points."""
+        cross = np.einsum("kcip,kaip->kcap", J, own)
+        with_cameras = cross[self._free, :6].reshape(-1, *cross.shape[2:])
+        return np.concatenate([with_cameras, cross[:, 6:].sum(axis=0)])
+
     def _of_cameras(self, e: Estimate, J: Array, residual: Array, weight: Array) -> tuple[Array, Array]:
         """Normal equations of cameras and lens alone (shared, shared), and their gradient (shared,)."""
-        free, shared = self._free, 6 * len(self._free) + _GLOBALS
-        # A camera's unknowns touch its own measurements only: blocks (K, 8, 8) instead of one matrix.
-        heavy = (J * weight).reshape(*J.shape[:2], -1)
-        blocks = heavy @ J.reshape(heavy.shape).transpose(0, 2, 1)
-        pull = (heavy @ residual.reshape(len(J), -1, 1))[:, :, 0]
-        U = np.zeros((shared, shared))
-        for column, k in enumerate(free):
-            rows = slice(6 * column, 6 * column + 6)
-            U[rows, rows] = blocks[k, :6, :6]
-            U[rows, -_GLOBALS:] = blocks[k, :6, 6:]
-            U[-_GLOBALS:, rows] = blocks[k, 6:, :6]
-        U[-_GLOBALS:, -_GLOBALS:] = blocks[:, 6:, 6:].sum(axis=0) + np.diag(1 / self.lens_spread**2)
-        gradient = np.append(pull[free, :6].ravel(), pull[:, 6:].sum(axis=0))
+        U, gradient = _normal_equations(self._free, J, residual, weight)
+        U[-_GLOBALS:, -_GLOBALS:] += np.diag(1 / self.lens_spread**2)
         gradient[-_GLOBALS:] += (e.lens - self.lens_prior) / self.lens_spread**2
         return U, gradient
 
@@ -355,6 +393,24 @@ class Bundle:
         low, high = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
         log_focal, k1 = np.clip(lens, low, high)
         return Estimate(R, t, X, float(log_focal), float(k1))
+
+
+def _normal_equations(
+    free: NDArray[np.int64], J: Array, residual: Array, weight: Array
+) -> tuple[Array, Array]:
+    """Those of cameras and lens (shared, shared) and their gradient (shared,), points where they are."""
+    # A camera's unknowns touch its own measurements only: blocks (K, 8, 8) instead of one matrix.
+    heavy = (J * weight).reshape(*J.shape[:2], -1)
+    blocks = heavy @ J.reshape(heavy.shape).transpose(0, 2, 1)
+    pull = (heavy @ residual.reshape(len(J), -1, 1))[:, :, 0]
+    count = 6 * len(free)
+    U = np.zeros((count + _GLOBALS, count + _GLOBALS))
+    each = np.arange(len(free))
+    U[:count, :count].reshape(len(free), 6, len(free), 6)[each, :, each] = blocks[free, :6, :6]
+    U[:count, count:] = blocks[free, :6, 6:].reshape(count, _GLOBALS)
+    U[count:, :count] = U[:count, count:].T
+    U[count:, count:] = blocks[:, 6:, 6:].sum(axis=0)
+    return U, np.append(pull[free, :6].ravel(), pull[:, 6:].sum(axis=0))
 
 
 def _square(residual: Array) -> Array:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.segmentation.median import median
 from ifsvideo.segmentation.world import REFIT_POINTS, World
 
 Array = NDArray[np.float64]
@@ -35,13 +36,12 @@ class Leeway:
     """
 
     def __init__(self, world: World, core: NDArray[np.int64], threshold: float) -> None:
-        self._by_cameras, self._missed = world.without_places()
+        self._freed = world.without_places()
         grant = world.bundle.tolerance * world.usual
-        self._scale = 1 / (grant * np.sqrt(world.bundle.freedom))
+        self._scale = 1 / (grant**2 * world.bundle.freedom)
         self._threshold = threshold
         few = core[:: 1 + (len(core) - 1) // REFIT_POINTS]
-        square = self._square(few, self._missed[few])
-        self._held = self._information(few, 1 / (1 + square / _DOUBTFUL**2) ** 2)[0]
+        self._held = self._information(few, 1 / (1 + self._square(few) / _DOUBTFUL**2) ** 2)[0]
         lens = np.zeros(len(self._held))
         lens[-2:] = 1 / world.bundle.lens_spread**2
         self._held += np.diag(lens)
@@ -49,22 +49,19 @@ class Leeway:
     def evidence(self, points: NDArray[np.int64]) -> float:
         """Median distance of some points (n,) from static points' ways, in the units of `World.evidence`,
         after the cameras gave way to them."""
-        missed = self._missed[points]
-        square = self._square(points, missed)
+        square = self._square(points)
         # Most of them decide; what fits worse than those is weighed down.
-        weight = 1 / (1 + square / max(float(np.median(square)), 1e-12)) ** 2
+        weight = 1 / (1 + square / max(median(square), 1e-12)) ** 2
         information, pull = self._information(points, weight)
         held = self._held + information
-        held += _GAUGE * np.trace(held) / len(held) * np.eye(len(held))
-        after = missed - self._by_cameras[points] @ np.linalg.solve(held, pull)
-        return float(np.sqrt(np.median(self._square(points, after)))) / self._threshold
+        held.flat[:: len(held) + 1] += _GAUGE * np.trace(held) / len(held)
+        after = self._square(points, -np.asarray(np.linalg.solve(held, pull), np.float64))
+        return float(np.sqrt(median(after))) / self._threshold
 
-    def _square(self, points: NDArray[np.int64], missed: Array) -> Array:
-        """Mean square error of points (n,), in units of what is usual."""
-        return np.asarray((missed**2).sum(axis=1) * self._scale[points] ** 2)
+    def _square(self, points: NDArray[np.int64], step: Array | None = None) -> Array:
+        """Mean square error of points (n,) after a step of the cameras, in units of what is usual."""
+        return np.asarray(self._freed.square(points, step) * self._scale[points])
 
     def _information(self, points: NDArray[np.int64], weight: Array) -> tuple[Array, Array]:
         """What points tell of the cameras: matrix (N, N) and pull (N,) of the normal equations."""
-        factor = (np.sqrt(weight) * self._scale[points])[:, None]
-        rows = (self._by_cameras[points] * factor[..., None]).reshape(-1, self._by_cameras.shape[2])
-        return rows.T @ rows, rows.T @ (self._missed[points] * factor).ravel()
+        return self._freed.information(points, weight * self._scale[points])

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ifsvideo.segmentation.bundle import Bundle, Estimate
+from ifsvideo.segmentation.bundle import Bundle, Estimate, Freed
 from ifsvideo.segmentation.key_frames import key_frames
 from ifsvideo.segmentation.road import find_road
 from ifsvideo.types import Bools, Tracks
@@ -133,9 +133,9 @@ class World:
         explained = error[(error > 0) & (error < 2)]
         return max(float(np.median(explained)) if len(explained) else 0.0, LEAST_USUAL)
 
-    def without_places(self) -> tuple[Array, Array]:
-        """Derivatives of the projections by cameras and lens (P, 2K, N) and residuals (P, 2K), normalised,
-        what each point's own place can make up for taken off."""
+    def without_places(self) -> Freed:
+        """Residuals, normalised, and their derivatives by cameras and lens, what each point's own place can
+        make up for taken off."""
         return self.bundle.without_places(self.estimate, self.has_moved)
 
     def fitted_to(self, points: NDArray[np.int64]) -> World:
