@@ -92,7 +92,7 @@ def _pieces(merging: Agglomeration, group: Group, gap: float) -> list[Group]:
 def _spread(anchor: NDArray[np.float64], size: tuple[int, int]) -> int:
     """Cells of the picture in which points lie."""
     cells = np.floor(anchor / np.array(size) * _SPREAD_CELLS).astype(int)
-    return len(np.unique(cells, axis=0))
+    return len(set(zip(*cells.T.tolist(), strict=True)))
 
 
 def background_first(

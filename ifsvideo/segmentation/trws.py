@@ -103,7 +103,7 @@ def solve(
 
 @dataclass(frozen=True)
 class _Problem:
-    """The energy, checked; every edge named once, its first node at the lower level."""
+    """The energy, checked; every edge named once, its first node at the lower level, in the order of that."""
 
     unary: Array
     edges: Indices
@@ -136,11 +136,15 @@ class _Problem:
         kinds = np.zeros(labels, bool) if attributes is None else np.asarray(attributes, bool)
         if kinds.shape != (labels,):
             raise ValueError(f"expected attributes of shape ({labels},), got {kinds.shape}")
-        pairs, which = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
-        w, e = (np.bincount(which.ravel(), x, len(pairs)).astype(np.float64) for x in both)
+        # Of whole numbers np.unique takes a tenth of the time that it takes of rows.
+        keys, which = np.unique(np.sort(pairs, axis=1) @ [nodes, 1], return_inverse=True)
+        pairs = np.stack(np.divmod(keys, nodes), axis=1)
+        w, e = (np.bincount(which, x, len(pairs)).astype(np.float64) for x in both)
         levels = _levels(nodes, pairs)
         upward = levels[pairs[:, 0]] < levels[pairs[:, 1]]
-        return cls(cost, np.where(upward[:, None], pairs, pairs[:, ::-1]), w, e, kinds, levels)
+        pairs = np.where(upward[:, None], pairs, pairs[:, ::-1])
+        order = np.argsort(levels[pairs[:, 0]], kind="stable")
+        return cls(cost, pairs[order], w[order], e[order], kinds, levels)
 
     def check_labels(self, labels: ArrayLike) -> Indices:
         nodes, count = self.unary.shape
@@ -179,7 +183,7 @@ def _levels(nodes: int, edges: Indices) -> Indices:
 class _Level:
     """The nodes that are updated at once, and their edges towards lower and higher levels.
 
-    ``lower`` and ``upper`` number the edges; ``lower_sum`` and ``upper_sum`` (nodes x edges) add up what runs
+    ``lower`` and ``upper`` are the edges; ``lower_sum`` and ``upper_sum`` (nodes x edges) add up what runs
     along them; ``lower_owner`` and ``upper_owner`` are the row of the node at the end in this level.
     ``unary`` (nodes, L) are the nodes' own costs, labels ordered by attribute.
     """
@@ -188,7 +192,7 @@ class _Level:
     unary: Array
     gamma: Array
     lower: Indices
-    upper: Indices
+    upper: slice
     lower_owner: Indices
     upper_owner: Indices
     lower_sum: Any
@@ -199,7 +203,8 @@ class _Messages:
     """Messages along the edges, and the two passes that renew them.
 
     ``up`` (E, L) runs from an edge's lower node to its upper one, ``down`` the other way (Kolmogorov's M_st
-    and M_ts). Inside, labels are ordered by attribute, so that each kind is a slice.
+    and M_ts). Inside, labels are ordered by attribute, so that each kind is a slice. What a level's nodes are
+    told in one pass, their sums (nodes, L) ``from_below`` or ``from_above``, still holds in the next.
     """
 
     def __init__(self, problem: _Problem) -> None:
@@ -212,6 +217,8 @@ class _Messages:
         self.up = np.zeros(shape)
         self.down = np.zeros(shape)
         self.schedule = [self._level(k) for k in range(int(problem.levels.max(initial=-1)) + 1)]
+        self.from_above = [np.zeros(level.unary.shape) for level in self.schedule]
+        self.from_below = [np.zeros(level.unary.shape) for level in self.schedule]
 
     def _level(self, number: int) -> _Level:
         problem = self.problem
@@ -219,7 +226,8 @@ class _Messages:
         row = np.zeros(len(problem.levels), np.int64)
         row[nodes] = np.arange(len(nodes))
         first, second = problem.edges.T
-        upper = np.flatnonzero(problem.levels[first] == number)
+        # In a row, so that nothing is copied to be read.
+        upper = slice(*np.searchsorted(problem.levels[first], [number, number + 1]).tolist())
         lower = np.flatnonzero(problem.levels[second] == number)
         owners = row[second[lower]], row[first[upper]]
         sums = [
@@ -239,11 +247,12 @@ class _Messages:
         """
         problem = self.problem
         labels = np.zeros(len(self.unary), np.int64)
-        for level in self.schedule:
-            from_above = level.unary + level.upper_sum @ self.down[level.upper]
+        for number, level in enumerate(self.schedule):
+            from_above = level.unary + self.from_above[number]
             agreed = self._agreement(level, labels[problem.edges[level.lower, 0]])
             labels[level.nodes] = (from_above - agreed).argmin(1)
-            belief = from_above + level.lower_sum @ self.up[level.lower]
+            self.from_below[number] = level.lower_sum @ self.up[level.lower]
+            belief = from_above + self.from_below[number]
             share = (level.gamma[:, None] * belief)[level.upper_owner]
             self.up[level.upper], _ = self._message(share - self.down[level.upper], level.upper)
         return self.order[labels]
@@ -255,16 +264,16 @@ class _Messages:
         the sum of every node's least cost, and every edge's with its share (gamma) of the upper node's.
         """
         bound = 0.0
-        for level in reversed(self.schedule):
-            belief = level.unary + level.lower_sum @ self.up[level.lower]
-            belief += level.upper_sum @ self.down[level.upper]
+        for number, level in reversed(list(enumerate(self.schedule))):
+            self.from_above[number] = level.upper_sum @ self.down[level.upper]
+            belief = level.unary + self.from_below[number] + self.from_above[number]
             least = belief.min(axis=1, keepdims=True)
             share = (level.gamma[:, None] * (belief - least))[level.lower_owner]
             self.down[level.lower], rest = self._message(share - self.up[level.lower], level.lower)
             bound += float(least.sum() + rest.sum())
         return bound
 
-    def _message(self, cost: Array, edges: Indices) -> tuple[Array, Array]:
+    def _message(self, cost: Array, edges: Indices | slice) -> tuple[Array, Array]:
         """min over l of cost(l) + V(l, m), for all m, (n, L), less its own minimum (n,); in O(L).
 
         Overwrites ``cost``.
