@@ -67,7 +67,8 @@ class TracksSegmenter:
     has passed most of what it saw at first is no single view, and what is seen too shortly to tell a window's
     motion follows its neighbours.
 
-    One window is segmented several times where that is doubtful (`SegmenterConfig.votes`).
+    One window is segmented several times where that is doubtful, and movers contest its ground
+    (`SegmenterConfig.votes`, `SegmenterConfig.contest`).
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ class TracksSegmenter:
         length = None if motions is not None else window_length(tracks, self.config.lasting)
         if length is not None:
             return _by_windows(segmenter, tracks, length)
-        return replace(segmenter, votes=self.config.votes).segment(tracks, motions)
+        return replace(segmenter, alone=True).segment(tracks, motions)
 
 
 def window_length(tracks: Tracks, lasting: float) -> int | None:

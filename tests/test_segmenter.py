@@ -228,12 +228,17 @@ def test_coordinates_may_count_from_the_middle_of_the_picture(origin: tuple[floa
     assert share_wrong(result.labels, scene.truth) < 0.05
 
 
-@pytest.mark.parametrize("contest", [True, False])
-def test_movers_may_contest_what_was_merged(monkeypatch: pytest.MonkeyPatch, contest: bool) -> None:
+@pytest.mark.parametrize(("contest", "alone"), [(True, True), (False, True), (True, False)])
+def test_movers_may_contest_what_was_merged(
+    monkeypatch: pytest.MonkeyPatch, contest: bool, alone: bool
+) -> None:
+    """In a sequence of its own, not in a window of a clip."""
+
     def all_of_it(labels: np.ndarray, confidence: np.ndarray, *_: Any) -> tuple[np.ndarray, np.ndarray]:
         return labels + 1, confidence / 2
 
     monkeypatch.setattr("ifsvideo.segmentation.segmenter.contested", all_of_it)
-    result = IFSSegmenter(SegmenterConfig(contest=contest)).segment(make_scene(static=40).tracks)
-    assert (result.labels == contest).all()
-    assert (result.confidence == (0.5 if contest else 1)).all()
+    config = SegmenterConfig(contest=contest)
+    result = IFSSegmenter(config, alone=alone).segment(make_scene(static=40).tracks)
+    assert (result.labels == (contest and alone)).all()
+    assert (result.confidence == (0.5 if contest and alone else 1)).all()

@@ -37,13 +37,15 @@ class IFSSegmenter:
     config : SegmenterConfig
     seed : int
         Same tracks, configuration and seed: same labels.
-    votes : int
-        How often all stages are run at most (`ifsvideo.segmentation.voting`).
+    alone : bool
+        Whether these tracks are all there is, not a window of a clip that others overlap. Then what is
+        doubtful is segmented several times (`ifsvideo.segmentation.voting`), and movers contest the ground
+        (`ifsvideo.segmentation.contest`).
     """
 
     config: SegmenterConfig = field(default_factory=SegmenterConfig)
     seed: int = 0
-    votes: int = 1
+    alone: bool = False
 
     def segment(self, tracks: Tracks, motions: int | None = None) -> Segmentation:
         """Label every track.
@@ -68,7 +70,7 @@ class IFSSegmenter:
         details: dict[str, Any] = {}
         if len(usable):
             chosen, rng = tracks.select(usable), np.random.default_rng(self.seed)
-            part = voted(lambda: self._stages(chosen, motions, rng), self.votes)
+            part = voted(lambda: self._stages(chosen, motions, rng), self.config.votes if self.alone else 1)
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence
             details = dict(part.details, usable=usable)
@@ -121,7 +123,7 @@ class IFSSegmenter:
             cues, joined = in_static_core(first, window, world, learnt(), config)
             merging = Agglomeration(cues, learnt().final)
             labels, confidence = merge_and_label(merging, joined, config, motions)
-            if config.contest and world is not None:
+            if self.alone and config.contest and world is not None:
                 # 6. What a mover predicts better than the static world does is its own.
                 reach = config.gap * unit
                 labels, confidence = contested(labels, confidence, window, world, cues, reach)
