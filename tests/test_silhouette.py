@@ -52,7 +52,7 @@ def found(ground: np.ndarray, shape: np.ndarray, sides=((-2, -1), (1, 2)), scale
         for side in sides
     ]
     here = frame(0, ground, shape, scale)
-    figure = find_silhouette(view, here, np.dstack([here] * 3), others)
+    figure = find_silhouette(view, here, np.dstack([view.box(here)] * 3), others)
     truth = ellipse(0, 0).astype(np.uint8).repeat(scale, axis=0).repeat(scale, axis=1)
     return figure, view.cut(truth)[0] > 0
 
@@ -93,7 +93,7 @@ def test_a_shape_that_does_not_move_by_itself_has_none() -> None:
         for lag in (-1, 1)
     ]
     still = moved(ground, 0 * PAN).clip(0, 255).astype(np.uint8)
-    none = find_silhouette(view, still, np.dstack([still] * 3), others)
+    none = find_silhouette(view, still, np.dstack([view.box(still)] * 3), others)
     assert none.mean() < 0.02 < figure.mean()
 
 

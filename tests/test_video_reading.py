@@ -18,6 +18,7 @@ import pytest
 from ifsvideo.errors import IfsVideoError, InputError, UsageError
 from ifsvideo.types import Image
 from ifsvideo.video import FrameSource, open_source, parse_time
+from ifsvideo.video.picture import Picture
 
 from .conftest import encode, pictures
 
@@ -160,6 +161,27 @@ def test_planes_have_the_colours_that_the_file_says(tmp_path: Path, matrix: str)
     assert np.abs(picture.to_wait().rgb - expected).mean() < 2
     shares = (0.2126, 0.7152, 0.0722) if matrix == "bt709" else (0.299, 0.587, 0.114)
     assert np.abs(picture.grey - expected @ shares).mean() < 2, "grey is the file's own luma"
+
+
+@pytest.mark.parametrize("bt709", [False, True])
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("planes", [False, True])
+def test_a_box_has_the_colours_of_the_picture(
+    monkeypatch: pytest.MonkeyPatch, planes: bool, packed: bool, bt709: bool
+) -> None:
+    """Wherever its borders lie: in planes four pixels share their colour."""
+    shape = (72, 64) if planes else (48, 64, 3)
+    picture = Picture(np.random.default_rng(0).integers(0, 256, shape, np.uint8), bt709)
+    if packed:
+        monkeypatch.setattr("ifsvideo.video.picture.LARGEST_KEPT", 0)
+        picture = picture.to_wait()
+    assert picture.size == (64, 48)
+    whole = picture.rgb
+    assert whole.shape == (48, 64, 3)
+    for left, top, width, height in ((0, 0, 64, 48), (7, 5, 21, 18), (8, 6, 19, 21), (63, 47, 1, 1)):
+        assert (
+            picture.rgb_of(left, top, width, height) == whole[top : top + height, left : left + width]
+        ).all()
 
 
 VARIABLE = (

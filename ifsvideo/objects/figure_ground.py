@@ -61,24 +61,25 @@ class _Seen:
     @cached_property
     def grey(self) -> Image:
         """(H, W) the picture in the size in which it is tracked."""
-        grey = self._picture.grey
-        height, width = grey.shape
-        return shrunk(grey, *tracked_size(width, height, self._scale))
+        return shrunk(self._picture.grey, *self.size)
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        """(W, H) in which it is tracked."""
+        return tracked_size(*self._picture.size, self._scale)
 
     @cached_property
     def _per_pixel(self) -> NDArray[np.float64]:
         """Pixels of this size per pixel of the coordinates, along x and y."""
-        return np.array(self.grey.shape[::-1]) / self._picture.size
+        return np.array(self.size) / self._picture.size
 
-    @property
-    def rgb(self) -> Image:
-        """(H, W, 3) the colours, in that size."""
-        rgb = self._picture.rgb
-        height, width = self.grey.shape
-        same = rgb.shape[:2] == (height, width)
-        return rgb if same else np.asarray(cv2.resize(rgb, (width, height)), np.uint8)
+    def colours_of(self, view: View) -> Image:
+        """(height, width, 3) the colours of a view's box, in that size."""
+        if self.size == self._picture.size:
+            return self._picture.rgb_of(view.left, view.top, view.width, view.height)
+        return view.box(np.asarray(cv2.resize(self._picture.rgb, self.size), np.uint8))
 
-    @property
+    @cached_property
     def xy(self) -> NDArray[np.float32]:
         """(N, 2) the points."""
         return self._scaled(self.points.xy)
@@ -231,15 +232,15 @@ class FigureGround:
     def _look_at(self, here: _Seen, number: int, place: int) -> None:
         """Find the silhouette of an object in a frame, and count the votes of the tracks round it."""
         xy, own = here.xy, here.labels == number
-        height, width = here.grey.shape
-        view = View.around(xy[own], _GROWTH, _MARGIN, (width, height))
-        motions = Motions(view, xy, own, here.ground, math.hypot(width, height) / 800)
+        view = View.around(xy[own], _GROWTH, _MARGIN, here.size)
+        motions = Motions(view, xy, own, here.ground, math.hypot(*here.size) / 800)
         if not motions.known or min(view.width, view.height) < _SMALLEST:
             return
         sides = [self._parted(motions, here.points.ids, place, way) for way in (-1, 1)]
         if not any(sides):
             return
-        silhouette = find_silhouette(view, here.grey, here.rgb, [[one for one, _ in side] for side in sides])
+        parted = [[one for one, _ in side] for side in sides]
+        silhouette = find_silhouette(view, here.grey, here.colours_of(view), parted)
         rows = np.flatnonzero(view.contains(xy))
         on = _lies_on(silhouette, view, xy[rows])
         tracks = here.points.ids[rows].tolist()

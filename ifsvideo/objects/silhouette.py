@@ -90,15 +90,18 @@ class View:
         left, top = max(0, self.left - margin), max(0, self.top - margin)
         right = min(width, self.left + self.width + margin)
         bottom = min(height, self.top + self.height + margin)
-        scale = np.array([self.columns / self.width, self.rows / self.height])
-        columns, rows = np.maximum(1, np.rint([right - left, bottom - top] * scale)).astype(int).tolist()
-        piece = picture[top:bottom, left:right]
-        if (rows, columns) != piece.shape[:2]:
-            piece = np.asarray(cv2.resize(piece, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
+        along_x, along_y = self.columns / self.width, self.rows / self.height
+        columns = max(1, round((right - left) * along_x))
+        rows = max(1, round((bottom - top) * along_y))
+        piece = _in_pixels(picture[top:bottom, left:right], columns, rows)
         # The piece has whole pixels: its own scale is not exactly the view's.
-        own = np.array([columns / (right - left), rows / (bottom - top)])
-        first = (np.array([self.left - left, self.top - top]) + 0.5 / scale) * own - 0.5
-        return np.ascontiguousarray(piece), np.asarray(first, np.float32)
+        x = (self.left - left + 0.5 / along_x) * (columns / (right - left)) - 0.5
+        y = (self.top - top + 0.5 / along_y) * (rows / (bottom - top)) - 0.5
+        return piece, np.array([x, y], np.float32)
+
+    def box(self, picture: Image) -> Image:
+        """The box of a picture, in the picture's own pixels."""
+        return picture[self.top : self.top + self.height, self.left : self.left + self.width]
 
 
 @dataclass(frozen=True)
@@ -118,14 +121,16 @@ class Parted:
     with_ground: Flow
 
 
-def find_silhouette(view: View, grey: Image, rgb: Image, sides: Sequence[Sequence[Parted]]) -> Bools:
+def find_silhouette(view: View, grey: Image, colours: Image, sides: Sequence[Sequence[Parted]]) -> Bools:
     """Whether each pixel of a view (rows, columns) belongs to the object.
 
     Parameters
     ----------
     view : View
-    grey, rgb : (H, W), (H, W, 3) uint8
+    grey : (H, W) uint8
         The picture that is looked at.
+    colours : (height, width, 3) uint8
+        RGB of the view's box of it.
     sides : sequence of sequences of Parted
         Frames before, and frames after; one of them may have none.
     """
@@ -142,8 +147,9 @@ def find_silhouette(view: View, grey: Image, rgb: Image, sides: Sequence[Sequenc
         return figure
     # It draws the first centres of its colours at random.
     cv2.setRNGSeed(0)
-    colours = np.zeros((2, 1, 65))
-    cv2.grabCut(view.cut(rgb)[0], told, (0, 0, 1, 1), colours[0], colours[1], 1, cv2.GC_INIT_WITH_MASK)
+    models = np.zeros((2, 1, 65))
+    shown = _in_pixels(colours, view.columns, view.rows)
+    cv2.grabCut(shown, told, (0, 0, 1, 1), models[0], models[1], 1, cv2.GC_INIT_WITH_MASK)
     # Where the picture is all edges GrabCut's outline may lie beside them: what is told stands.
     return np.asarray((told % 2 == 1) & (log_ratio > -_SURE), bool)
 
@@ -159,6 +165,13 @@ def _log_ratio(view: View, grey: Image, sides: Sequence[Sequence[Parted]]) -> ND
     seen = np.isfinite(least).all(axis=0)
     ratio[seen] = np.log((least[1, seen] + _NOISE) / (least[0, seen] + _NOISE))
     return ratio
+
+
+def _in_pixels(piece: Image, columns: int, rows: int) -> Image:
+    """A piece of a picture in so many pixels, by the mean over each."""
+    if (rows, columns) == piece.shape[:2]:
+        return np.ascontiguousarray(piece)
+    return np.asarray(cv2.resize(piece, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _smooth(grey: Image) -> Image:

@@ -45,6 +45,7 @@ class Picture:
     def __init__(self, pixels: Image, bt709: bool = False) -> None:
         self._kept: Image = pixels
         self._bt709 = bt709
+        self._shape = pixels.shape
         self._is_packed = False
 
     @property
@@ -59,22 +60,43 @@ class Picture:
         if self._is_packed or self._kept.nbytes <= LARGEST_KEPT:
             return self
         packed = Picture(np.asarray(cv2.imencode(".jpg", self._kept, _QUALITY)[1], np.uint8), self._bt709)
-        packed._is_packed = True
+        packed._shape, packed._is_packed = self._shape, True
         return packed
 
     @property
     def size(self) -> tuple[int, int]:
         """(width, height), pixels."""
-        height, width = self.pixels.shape[:2]
-        return width, height if self.pixels.ndim == 3 else height * 2 // 3
+        height, width = self._shape[:2]
+        return width, height if len(self._shape) == 3 else height * 2 // 3
 
     @property
     def rgb(self) -> Image:
         """(H, W, 3) uint8, made anew from planes."""
         pixels = self.pixels
+        return pixels if pixels.ndim == 3 else self._coloured(pixels)
+
+    def rgb_of(self, left: int, top: int, width: int, height: int) -> Image:
+        """(height, width, 3) uint8 the same colours of a box inside the picture: only these are made.
+
+        Parameters
+        ----------
+        left, top, width, height : int
+            Pixels; at least one each way.
+        """
+        pixels = self.pixels
         if pixels.ndim == 3:
-            return pixels
-        planes = _as_bt601(pixels) if self._bt709 else pixels
+            return pixels[top : top + height, left : left + width]
+        # Four pixels share a U and a V: the box is cut from the planes with even sides.
+        column, row = left // 2, top // 2
+        columns, rows = (left + width + 1) // 2 - column, (top + height + 1) // 2 - row
+        whole = len(pixels) * 2 // 3
+        luma = pixels[2 * row : 2 * (row + rows), 2 * column : 2 * (column + columns)]
+        both = pixels[whole:].reshape(2, whole // 2, -1)[:, row : row + rows, column : column + columns]
+        rgb = self._coloured(np.concatenate([luma, both.reshape(rows, 2 * columns)]))
+        return rgb[top - 2 * row :, left - 2 * column :][:height, :width]
+
+    def _coloured(self, planes: Image) -> Image:
+        planes = _as_bt601(planes) if self._bt709 else planes
         return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YUV2RGB_I420), np.uint8)
 
     @property
