@@ -160,11 +160,11 @@ def _log_ratio(view: View, grey: Image, sides: Sequence[Sequence[Parted]]) -> ND
     least = np.full((2, view.rows, view.columns), np.inf, np.float32)
     for side in sides:
         if side:
-            np.minimum(least, np.mean([_misfits(view, here, other) for other in side], axis=0), out=least)
-    ratio = np.zeros(least.shape[1:], np.float32)
-    seen = np.isfinite(least).all(axis=0)
-    ratio[seen] = np.log((least[1, seen] + _NOISE) / (least[0, seen] + _NOISE))
-    return ratio
+            misfits = [_misfits(view, here, other) for other in side]
+            np.minimum(least, sum(misfits[1:], misfits[0]) / len(side), out=least)
+    least[np.isinf(least)] = 0
+    to_object, to_ground = least + _NOISE
+    return np.asarray(np.log(to_ground / to_object), np.float32)
 
 
 def _in_pixels(piece: Image, columns: int, rows: int) -> Image:
@@ -201,5 +201,6 @@ def _misfits(view: View, here: Image, other: Parted) -> NDArray[np.float32]:
             there, x + first[0], y + first[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
         cv2.blur(cv2.absdiff(shown, here).astype(np.float32), _BESIDE.shape, dst=misfit)
-    misfits[:, outside] = np.inf
+    if outside.any():
+        misfits[:, outside] = np.inf
     return misfits
