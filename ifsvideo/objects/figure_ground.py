@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.objects import parting
-from ifsvideo.objects.parting import NODES, PARTED, Motions, how_far_parted
+from ifsvideo.objects.parting import NODES, PARTED, Motions, how_far_parted, lengths, middle
 from ifsvideo.objects.silhouette import Flow, Parted, View, find_silhouette
 from ifsvideo.tracking.tracker import shrunk, tracked_size
 from ifsvideo.types import BACKGROUND, Bools, FramePoints, Image, Ints
@@ -197,16 +197,19 @@ class FigureGround:
     def _look(self, place: int) -> None:
         """Look at the objects in a frame that have not been looked at for long."""
         here = self._recent[place - self._frames]
-        if not (here.labels > BACKGROUND).any() or self._camera_stands(here):
-            return
-        looks = {}
+        looks, due = {}, []
         for number in np.unique(here.labels[here.labels > BACKGROUND]).tolist():
             look = self._looks.get(number)
             tracks = here.points.ids[here.labels == number]
             if look is None or self._is_due(look, place, tracks):
                 look = _Look(place, tracks)
-                self._look_at(here, number, place)
+                due.append(number)
             looks[number] = look
+        # The camera is asked last: in most frames nobody is due.
+        if not looks or (not due and looks.keys() == self._looks.keys()) or self._camera_stands(here):
+            return
+        for number in due:
+            self._look_at(here, number, place)
         self._looks = looks
 
     def _camera_stands(self, here: _Seen) -> bool:
@@ -217,8 +220,9 @@ class FigureGround:
         """
         ids, xy = here.points.ids[here.ground], here.points.xy[here.ground]
         for other in (self._recent[0], self._recent[-1]):
-            step = np.linalg.norm(other.points.positions(ids) - xy, axis=1)
-            if np.isfinite(step).any() and np.nanmedian(step) > _STANDS:
+            step = lengths(other.points.positions(ids) - xy)
+            seen = step[np.isfinite(step)]
+            if len(seen) and middle(seen) > _STANDS:
                 return False
         return True
 
@@ -226,8 +230,10 @@ class FigureGround:
         since = place - look.place
         if since >= self._seldom:
             return True
+        if since < self._often:
+            return False
         left = np.count_nonzero(np.isin(look.tracks, tracks, assume_unique=True))
-        return since >= self._often and bool(left < (1 - _LOST) * len(look.tracks))
+        return bool(left < (1 - _LOST) * len(look.tracks))
 
     def _look_at(self, here: _Seen, number: int, place: int) -> None:
         """Find the silhouette of an object in a frame, and count the votes of the tracks round it."""
@@ -293,12 +299,13 @@ def _go_along(
 ) -> Bools:
     """Whether tracks move rather as the object than as the ground; so those do that are seen once."""
     lead = np.zeros(len(tracks))
+    if not len(tracks):
+        return lead >= 0
     place = view.places(xy[tracks], NODES, NODES)
     for parted, there in others:
         step = there[tracks] - xy[tracks]
         to_object, to_ground = (
-            np.linalg.norm(step - _at(flow, place), axis=1)
-            for flow in (parted.with_object, parted.with_ground)
+            lengths(step - _at(flow, place)) for flow in (parted.with_object, parted.with_ground)
         )
         lead += np.nan_to_num(to_ground - to_object)
     return np.asarray(lead >= 0, bool)
@@ -306,8 +313,6 @@ def _go_along(
 
 def _at(flow: Flow, place: NDArray[np.float32]) -> NDArray[np.float32]:
     """The flow (N, 2) at places (N, 2) in pixels of its nodes, bilinear between them."""
-    if not len(place):
-        return np.empty((0, 2), np.float32)
     x, y = place[:, :1], place[:, 1:]
     at = cv2.remap(flow, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(at[:, 0], np.float32)

@@ -77,14 +77,14 @@ class Motions:
         with_ground = _median(ground[self._near], _NEIGHBOURS)
         none_near = np.isnan(with_ground[:, 0])
         if none_near.any():
-            with_ground[none_near] = _middle(ground[seen_ground])
+            with_ground[none_near] = middle(ground[seen_ground])
         shape = (NODES, NODES, 2)
         return with_object.reshape(shape).astype(np.float32), with_ground.reshape(shape).astype(np.float32)
 
 
 def how_far_parted(with_object: Flow, with_ground: Flow) -> float:
     """Distance of two motions at the typical node, pixels; from `PARTED` on a pixel can tell them."""
-    return float(_middle(_length((with_object - with_ground).reshape(-1, 2))))
+    return float(middle(lengths((with_object - with_ground).reshape(-1, 2))))
 
 
 def lags(rate: float, seconds: Iterable[float]) -> tuple[int, ...]:
@@ -95,19 +95,19 @@ def lags(rate: float, seconds: Iterable[float]) -> tuple[int, ...]:
 def _affine(xy: NDArray[np.float32], step: Array, nodes: NDArray[np.float32]) -> Array:
     """Steps (M, 2) of nodes by the affine motion of most of the tracks (N, 2), that which is linear in their
     place held back a little; by the median step where there are few tracks."""
-    usual = _middle(step)
+    usual = middle(step)
     if len(xy) < _FEW:
         return np.broadcast_to(usual, nodes.shape).copy()
     centre, spread = xy.mean(axis=0), max(float(xy.std(axis=0).max()), 1.0)
     place, there = (_with_one((some - centre) / spread) for some in (xy, nodes))
     odd = step - usual
-    misfit = _length(odd)
+    misfit = lengths(odd)
     for k in range(_FITS):
-        typical = max(_NO_MISFIT, 1.5 * float(_middle(misfit)))
+        typical = max(_NO_MISFIT, 1.5 * float(middle(misfit)))
         weighted = (place / (1 + (misfit / typical) ** 2)[:, None]).T
         motion = np.linalg.solve(weighted @ place + _HELD_BACK, weighted @ odd)
         if k + 1 < _FITS:
-            misfit = _length(odd - place @ motion)
+            misfit = lengths(odd - place @ motion)
     return np.asarray(usual + there @ motion)
 
 
@@ -118,13 +118,13 @@ def _with_one(place: NDArray[np.floating[Any]]) -> Array:
     return beside
 
 
-def _length(steps: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def lengths(steps: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Lengths (N,) of steps (N, 2)."""
     x, y = steps.T
     return np.asarray(np.sqrt(x * x + y * y))
 
 
-def _middle(of: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def middle(of: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Median along the first axis; of some tens of numbers NumPy's own takes ten times as long."""
     ordered = np.sort(of, axis=0)
     return np.asarray((ordered[(len(of) - 1) // 2] + ordered[len(of) // 2]) / 2)
