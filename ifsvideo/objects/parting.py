@@ -59,7 +59,9 @@ class Motions:
         """Whether there are tracks enough, near enough."""
         if self.known:
             asked = min(2 * _NEIGHBOURS, len(self._ground))
-            distance, near = cKDTree(xy[self._ground]).query(self._nodes, k=asked)
+            # A tree for so few questions is not worth balancing.
+            tree = cKDTree(xy[self._ground], compact_nodes=False, balanced_tree=False)
+            distance, near = tree.query(self._nodes, k=asked)
             self._near = np.asarray(near, np.int64)
             rim = np.ones((NODES, NODES), bool)
             rim[1:-1, 1:-1] = False
