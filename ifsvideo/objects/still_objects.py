@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.objects.camera_fixed import SHAKE_TO_SPREAD
+from ifsvideo.objects.parting import lengths, middle
 from ifsvideo.types import BACKGROUND, FramePoints, Ints
 
 _LEAST_WORLD = 8
@@ -49,15 +50,17 @@ def still_objects(
     for (before, was), (after, now) in pairwise(zip(points, labels, strict=True)):
         if not (now > BACKGROUND).any():
             continue
-        _, a, b = np.intersect1d(before.ids, after.ids, assume_unique=True, return_indices=True)
-        step = np.asarray(after.xy[b] - before.xy[a], np.float64)
-        label = np.where(was[a] == now[b], now[b], -1)
+        place = np.minimum(np.searchsorted(after.ids, before.ids), len(after.ids) - 1)
+        both = after.ids[place] == before.ids
+        place = place[both]
+        step = np.asarray(after.xy[place] - before.xy[both], np.float64)
+        label = np.where(was[both] == now[place], now[place], -1)
         world = step[label == BACKGROUND]
-        if len(world) < _LEAST_WORLD or np.median(np.linalg.norm(world, axis=1)) < _WORLD_GOES * unit:
+        if len(world) < _LEAST_WORLD or middle(lengths(world)) < _WORLD_GOES * unit:
             continue
-        common = np.median(world, axis=0)
+        common = middle(world)
         for number in np.unique(label[label > BACKGROUND]).tolist():
-            steps[number].append(np.concatenate([np.median(step[label == number], axis=0), common]))
+            steps[number].append(np.concatenate([middle(step[label == number]), common]))
     return {number for number, own in steps.items() if _stays(np.array(own), unit, config)}
 
 
