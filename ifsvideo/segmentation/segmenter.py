@@ -39,7 +39,8 @@ class IFSSegmenter:
         Same tracks, configuration and seed: same labels.
     alone : bool
         Whether these tracks are all there is, not a window of a clip that others overlap. Then what is
-        doubtful is segmented several times (`ifsvideo.segmentation.voting`), and movers contest the ground
+        doubtful is segmented several times (`ifsvideo.segmentation.voting`), the static core grows twice
+        (`ifsvideo.segmentation.static_core`), and movers contest the ground
         (`ifsvideo.segmentation.contest`).
     """
 
@@ -120,7 +121,8 @@ class IFSSegmenter:
             nearness = np.zeros(tracks.points) if world is None else world.nearness
             first = Cues(tracks, anchor, evidence, nearness, unit, config.pairs)
             window = Window(segments, fit < config.outlier_cost, size)
-            cues, joined = in_static_core(first, window, world, learnt(), config)
+            doubts = config.core_doubts(self.alone)
+            cues, joined = in_static_core(first, window, world, learnt(), doubts, config.evidence_threshold)
             merging = Agglomeration(cues, learnt().final)
             labels, confidence = merge_and_label(merging, joined, config, motions)
             if self.alone and config.contest and world is not None:
