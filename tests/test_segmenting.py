@@ -40,7 +40,7 @@ def drive(frames: int, life: int, seed: int = 0) -> Scene:
 
 def test_tracks_that_last_are_one_window() -> None:
     tracks = make_scene(movers=(LEFT_CAR,)).tracks
-    ours, one = TracksSegmenter().segment(tracks), IFSSegmenter().segment(tracks)
+    ours, one = TracksSegmenter().segment(tracks), IFSSegmenter(alone=True).segment(tracks)
     assert np.array_equal(ours.labels, one.labels)
     assert np.array_equal(ours.segments, one.segments)
     assert np.array_equal(ours.confidence, one.confidence)

@@ -41,6 +41,12 @@ _SELDOM_S, _OFTEN_S = 0.134, 0.067
 _LOST = 0.22
 """Share of an object's tracks that may have ended since the last look: so each track is asked some four times
 in its life."""
+_LEAST_VOTES = 2
+"""Looks by which a track must have lain beside its object more often than on it: one alone may be wrong."""
+_HELD = 0.7
+"""Share of the tracks of which a window has decided that a silhouette must hold. One that holds fewer is that
+of a part, or of something else: what was taken for the ground moves with the object. At 10 frames a second
+it is the wrong one at times, and without this a tenth of what moves in KT3DMoSeg goes to the background."""
 _STANDS = 1.0
 """How far the ground's typical track goes at most over the longest of these times before a camera that
 stands, pixels."""
@@ -177,7 +183,7 @@ class FigureGround:
         result = labels.astype(np.int64)
         beside: dict[int, list[int]] = {}
         for (track, number), vote in self._stays.items():
-            if vote < 0:
+            if vote <= -_LEAST_VOTES:
                 beside.setdefault(number, []).append(track)
         for number, tracks in beside.items():
             result[(labels == number) & np.isin(ids, tracks)] = BACKGROUND
@@ -249,6 +255,9 @@ class FigureGround:
         silhouette = find_silhouette(view, here.grey, here.colours_of(view), parted)
         rows = np.flatnonzero(view.contains(xy))
         on = _lies_on(silhouette, view, xy[rows])
+        held = on[(own & ~here.guessed)[rows]]
+        if np.count_nonzero(held) < _HELD * len(held):
+            return
         tracks = here.points.ids[rows].tolist()
         for k in np.flatnonzero(own[rows]).tolist():
             self._stays[tracks[k], number] += 1 if on[k] else -1
