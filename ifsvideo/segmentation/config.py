@@ -93,8 +93,7 @@ class SegmenterConfig:
     """The same in a sequence that is one window, where the core grows once more."""
     wider_core_doubt: float = 0.3
     """The same in the world of that narrow core, by the rule of the last pass: the core that the world is
-    fitted to in the end. 0 leaves it at ``core_doubt``. A window of a clip
-    has one core: others overlap it."""
+    fitted to in the end. 0 leaves it at ``core_doubt``. A clip's window has one core: others overlap it."""
     evidence_threshold: float = 5.0
     """How many times farther than usual in the window a point must be from a static point's way to be as
     likely moving as not."""
