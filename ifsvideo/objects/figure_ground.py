@@ -16,6 +16,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from ifsvideo.objects import parting
 from ifsvideo.objects.parting import NODES, PARTED, Motions, how_far_parted, lengths, middle
@@ -322,6 +323,12 @@ def _go_along(
 
 def _at(flow: Flow, place: NDArray[np.float32]) -> NDArray[np.float32]:
     """The flow (N, 2) at places (N, 2) in pixels of its nodes, bilinear between them."""
-    x, y = place[:, :1], place[:, 1:]
-    at = cv2.remap(flow, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(at[:, 0], np.float32)
+    # Not cv2.remap: it takes 32766 points at most, and a tracker of one's own may give more.
+    x, y = place.T
+    return np.stack(
+        [
+            map_coordinates(one, [y, x], np.float32, order=1, mode="nearest")
+            for one in np.moveaxis(flow, 2, 0)
+        ],
+        axis=1,
+    )
