@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -66,6 +68,31 @@ def merge_and_label(
     for number, members in enumerate(sorted(things, key=lambda m: (-len(m), int(m[0]))), 1):
         labels[members] = number
     return labels, confidence
+
+
+def apart_from_each_other(
+    labels: NDArray[np.int64], window: Window, merging: Agglomeration
+) -> NDArray[np.float64]:
+    """How likely each two of the labels are two motions (G, G), 1 where one has no points.
+
+    Parameters
+    ----------
+    labels : (P,) int64
+        From 0, as they are in the end: parts were rejoined or contested after they were merged.
+    window : Window
+    merging : Agglomeration
+        With the measurements and the rule.
+    """
+    count = int(labels.max(initial=-1)) + 1
+    apart = np.ones((count, count))
+    groups = {}
+    for label in np.unique(labels).tolist():
+        members = np.flatnonzero(labels == label)
+        reliable = members[window.explained[members]]
+        groups[label] = merging.cues.group(members, reliable if len(reliable) >= 2 else members)
+    for a, b in combinations(groups, 2):
+        apart[a, b] = apart[b, a] = merging.apart(groups[a], groups[b])
+    return apart
 
 
 def static_group(groups: list[Group], anchor: NDArray[np.float64], size: tuple[int, int]) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ifsvideo.lens import undistort
 from ifsvideo.segmentation.agglomeration import Agglomeration, Window
 from ifsvideo.segmentation.assignment import assign, residuals
-from ifsvideo.segmentation.background import background_first, merge_and_label
+from ifsvideo.segmentation.background import apart_from_each_other, background_first, merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.contest import contested
 from ifsvideo.segmentation.cues import Cues
@@ -24,6 +24,7 @@ from ifsvideo.segmentation.similarity import learnt
 from ifsvideo.segmentation.smoothing import smoothed
 from ifsvideo.segmentation.static_core import in_static_core
 from ifsvideo.segmentation.voting import voted
+from ifsvideo.segmentation.whole import Whole
 from ifsvideo.segmentation.world import World, fit_world
 from ifsvideo.types import UNDECIDED, Segmentation, Tracks
 
@@ -38,10 +39,10 @@ class IFSSegmenter:
     seed : int
         Same tracks, configuration and seed: same labels.
     alone : bool
-        Whether these tracks are all there is, not a window of a clip that others overlap. Then what is
-        doubtful is segmented several times (`ifsvideo.segmentation.voting`), the static core grows twice
-        (`ifsvideo.segmentation.static_core`), and movers contest the ground
-        (`ifsvideo.segmentation.contest`).
+        Whether these tracks are all there is, not a window of a clip that others overlap. Then a cut of all
+        points at once is asked, too, and what it does not confirm is segmented several times
+        (`ifsvideo.segmentation.voting`), the static core grows twice (`ifsvideo.segmentation.static_core`),
+        and movers contest the ground (`ifsvideo.segmentation.contest`).
     """
 
     config: SegmenterConfig = field(default_factory=SegmenterConfig)
@@ -70,20 +71,30 @@ class IFSSegmenter:
         confidence = np.zeros(tracks.points)
         details: dict[str, Any] = {}
         if len(usable):
-            chosen, rng = tracks.select(usable), np.random.default_rng(self.seed)
-            part = voted(lambda: self._stages(chosen, motions, rng), self.config.votes if self.alone else 1)
+            chosen, size = self._prepared(tracks.select(usable))
+            rng = np.random.default_rng(self.seed)
+
+            def stages() -> Segmentation:
+                return self._stages(chosen, size, motions, rng)
+
+            part = voted(stages, self.config.votes, Whole(chosen), motions) if self.alone else stages()
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence
             details = dict(part.details, usable=usable)
         return Segmentation(labels, background, segments, confidence, details)
 
-    def _stages(self, tracks: Tracks, motions: int | None, rng: np.random.Generator) -> Segmentation:
-        config = self.config
+    def _prepared(self, tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
+        """What all stages start from: tracks as a straight lens would have them, without much noise, and the
+        size of their picture."""
         tracks, size = in_a_picture(tracks)
-        if config.distortion:
-            tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
-        unit = float(np.hypot(*size)) / 800
-        tracks = smoothed(tracks, config.smoothing, unit)
+        if self.config.distortion:
+            tracks = replace(tracks, xy=undistort(tracks.xy, size, self.config.distortion))
+        return smoothed(tracks, self.config.smoothing, _unit(size)), size
+
+    def _stages(
+        self, tracks: Tracks, size: tuple[int, int], motions: int | None, rng: np.random.Generator
+    ) -> Segmentation:
+        config, unit = self.config, _unit(size)
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
@@ -129,8 +140,9 @@ class IFSSegmenter:
                 # 6. What a mover predicts better than the static world does is its own.
                 reach = config.gap * unit
                 labels, confidence = contested(labels, confidence, window, world, cues, reach)
+            if self.alone:
+                details |= {"doubt": merging.doubt, "apart": apart_from_each_other(labels, window, merging)}
             evidence = cues.evidence
-            details["doubt"] = merging.doubt
             details |= {"window": window, "joined": joined, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
         return Segmentation(labels, background, segments, confidence, details)
@@ -146,6 +158,11 @@ class IFSSegmenter:
         support = epipolar_support(tracks, self.config.epipolar_error * unit, self.seed)
         # Support of one half, the thesis's own limit, is where evidence turns.
         return support, 2 * (1 - support), None
+
+
+def _unit(size: tuple[int, int]) -> float:
+    """Pixels of a picture of this size per pixel of a 640x480 one."""
+    return float(np.hypot(*size)) / 800
 
 
 def in_a_picture(tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:

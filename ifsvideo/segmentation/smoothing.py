@@ -62,6 +62,24 @@ def smoothed(tracks: Tracks, strength: float, unit: float) -> Tracks:
     return replace(tracks, xy=np.where(tracks.visible[..., None], found + path, np.nan))
 
 
+def without_gaps(tracks: Tracks) -> Tracks:
+    """The same tracks seen in every frame: between two measurements each goes straight, beside the path that
+    most have in common, and before the first and after the last it stays beside it.
+
+    A place to start from where a method needs every point in every frame, never a measurement.
+    """
+    if tracks.visible.all():
+        return tracks
+    path, frames = _common_path(tracks), np.arange(tracks.frames)
+    xy = tracks.xy.copy()
+    for point in np.flatnonzero(~tracks.visible.all(axis=0)):
+        seen = np.flatnonzero(tracks.visible[:, point])
+        beside = xy[seen, point] - path[seen]
+        for axis in (0, 1):
+            xy[:, point, axis] = np.interp(frames, seen, beside[:, axis]) + path[:, axis]
+    return replace(tracks, xy=xy, visible=np.ones_like(tracks.visible))
+
+
 def _common_path(tracks: Tracks) -> Array:
     """The way (F, 2) that most points have in common: the median step of each frame, summed up."""
     common = np.zeros((tracks.frames, 2))

@@ -1,57 +1,149 @@
-"""What chance decides is tried again, until two segmentations agree.
+"""What is doubtful is asked twice: of a cut of all points at once, then of chance, again and again.
 
 Models are sampled at random, and where a thing hardly moves it is up to them whether its segments are pure
-enough to be told from the ground. Where one segmentation is sure of all its merges it stands. Else others are
-made: what is right is found again, mistakes are seldom made twice. No score of a single one tells which is
-right (`ifsvideo/benchmark/TRIED.md`).
+enough to be told from the ground. No score of a single segmentation tells whether it is right
+(`ifsvideo/benchmark/TRIED.md`). But a cut of all points at once, told their number of motions, is another
+view of the same tracks (`ifsvideo.segmentation.whole`), and what both find is hardly ever wrong. So the first
+segmentation that it confirms stands. One motion too many, the ground in two parts, is often confirmed as
+well; then the cut into one motion fewer confirms the ground in one, and how likely the two parts are apart
+decides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+from scipy.special import logit
 
-from ifsvideo.types import Segmentation
+from ifsvideo.segmentation.whole import Whole
+from ifsvideo.types import BACKGROUND, Segmentation
+
+Labels = NDArray[np.int64]
 
 _SURE = 0.05
-"""Probability that its most doubtful merge, or pair left apart, is wrong, up to which a segmentation stands;
-half of Hopkins-155 do."""
+"""Probability that its most doubtful merge, or pair left apart, is wrong, up to which a segmentation is sure
+of its number of motions; half of Hopkins-155 are."""
 _ALIKE = 0.02
-"""Share of the points by which two segmentations may differ and be the same."""
+"""Share of the points by which two segmentations may differ and be the same. A single point always may."""
 
 
-def voted(segment: Callable[[], Segmentation], votes: int) -> Segmentation:
-    """The first segmentation that is sure or is found twice; where none is, that which resembles all most.
+def voted(
+    segment: Callable[[], Segmentation], votes: int, whole: Whole, motions: int | None = None
+) -> Segmentation:
+    """The first segmentation that a cut of all points confirms; where none is, that which resembles all most.
+
+    One that is sure of its number of motions stands at once, and so does the one in the middle in the end: as
+    it is, or as the cut into as many motions has it, whichever fits better.
 
     Parameters
     ----------
     segment : callable
-        Makes one, another one each time; ``details["doubt"]`` is how likely its most doubtful decision is
-        wrong, without it there was none.
+        Makes one, another one each time. Of ``details`` these are read: ``doubt``, how likely its most
+        doubtful decision is wrong, without which the first one stands as it is; ``apart`` (G, G), how likely
+        each two of its groups are two motions.
     votes : int
-        How many are made at most.
+        How many are made at most; of one nothing is asked.
+    whole : Whole
+        The same tracks as a whole.
+    motions : int, optional
+        Number of motions, where it is known: none are joined then.
     """
-    found = [segment()]
-    if found[0].details.get("doubt", 0.0) <= _SURE:
-        return found[0]
+    found: list[Segmentation] = []
     while len(found) < votes:
-        again = segment()
-        for before in found:
-            if difference(before.labels, again.labels) <= _ALIKE:
-                return before
-        found.append(again)
+        one = segment()
+        if votes == 1 or "doubt" not in one.details:
+            return one
+        sure = one.details["doubt"] <= _SURE
+        if sure and not found:
+            return _fitting(one, whole)
+        joined = one if sure or motions is not None else _with_one_ground(one, whole)
+        if joined is not one or _confirmed(one.labels, whole):
+            return joined
+        found.append(one)
     away = [sum(difference(one.labels, other.labels) for other in found) for one in found]
-    return found[int(np.argmin(away))]
+    return _fitting(found[int(np.argmin(away))], whole)
 
 
-def difference(one: NDArray[np.int64], other: NDArray[np.int64]) -> float:
+def difference(one: Labels, other: Labels) -> float:
     """Share of the points that two labellings (P,) put into different groups, whatever these are called."""
     if not len(one):
         return 0.0
-    rows, columns = (np.unique(labels, return_inverse=True)[1] for labels in (one, other))
-    shared = np.zeros((rows.max() + 1, columns.max() + 1), dtype=np.int64)
+    return float(np.count_nonzero(_named_alike(one, other) != other)) / len(one)
+
+
+def _named_alike(one: Labels, other: Labels) -> Labels:
+    """One labelling (P,) with the numbers of those groups of another that share most points; -1 what has no
+    counterpart."""
+    (names, rows), (others, columns) = (np.unique(labels, return_inverse=True) for labels in (one, other))
+    shared = np.zeros((len(names), len(others)), dtype=np.int64)
     np.add.at(shared, (rows, columns), 1)
-    return 1 - float(shared[linear_sum_assignment(shared, maximize=True)].sum()) / len(one)
+    counterpart = np.full(len(names), -1, dtype=np.int64)
+    matched, to = linear_sum_assignment(shared, maximize=True)
+    counterpart[matched] = others[to]
+    return np.asarray(counterpart[rows])
+
+
+def _alike(one: Labels, other: Labels) -> bool:
+    """Whether two labellings (P,) are the same but for a few points."""
+    return difference(one, other) * len(one) < max(_ALIKE * len(one), 1) + 1e-6
+
+
+def _confirmed(labels: Labels, whole: Whole) -> bool:
+    """Whether the cut into as many motions is the same."""
+    cut = whole.cut(len(np.unique(labels)))
+    return cut is not None and _alike(labels, cut.labels)
+
+
+def _with_one_ground(found: Segmentation, whole: Whole) -> Segmentation:
+    """The segmentation without a doubtful motion: two groups that the cut into one motion fewer has as one,
+    while all others are the same, are one unless they are surely apart.
+
+    How sure the segmentation is of that is weighed with how sure the cuts are: the odds that the two are
+    apart times how much less certain the cut into fewer is.
+    """
+    groups = np.unique(found.labels).tolist()
+    fewer, same = whole.cut(len(groups) - 1), whole.cut(len(groups))
+    if fewer is None or same is None:
+        return found
+    joined = {(a, b): np.where(found.labels == b, a, found.labels) for a, b in combinations(groups, 2)}
+    pair = min(joined, key=lambda pair: difference(joined[pair], fewer.labels))
+    if not _alike(joined[pair], fewer.labels):
+        return found
+    odds = logit(found.details["apart"][pair]) + np.log(fewer.uncertainty / same.uncertainty)
+    return found if odds > logit(1 - _SURE) else _with_one_ground(_joined(found, *pair), whole)
+
+
+def _joined(found: Segmentation, first: int, second: int) -> Segmentation:
+    """The segmentation with its second group as part of the first, movers numbered by size again."""
+    labels, confidence, apart = found.labels.copy(), found.confidence.copy(), found.details["apart"].copy()
+    confidence[labels == second] = np.median(confidence[labels == first])
+    labels[labels == second] = first
+    # Both parts must be doubtful for a third group to join them.
+    apart[first] = apart[:, first] = np.maximum(apart[first], apart[second])
+    movers, sizes = np.unique(labels[labels > BACKGROUND], return_counts=True)
+    old = np.concatenate([[BACKGROUND], movers[np.argsort(-sizes, kind="stable")]])
+    new = np.zeros(len(apart), dtype=np.int64)
+    new[old] = np.arange(len(old))
+    details = dict(found.details, apart=apart[np.ix_(old, old)])
+    return replace(found, labels=new[labels], confidence=confidence, details=details)
+
+
+def _fitting(found: Segmentation, whole: Whole) -> Segmentation:
+    """The segmentation, or the cut into as many motions if that is another one and fits better."""
+    cut = whole.cut(len(np.unique(found.labels)))
+    if cut is None or _alike(found.labels, cut.labels):
+        return found
+    if whole.misfit(found.labels) <= whole.misfit(cut.labels):
+        return found
+    labels = _named_alike(cut.labels, found.labels)
+    confidence = found.confidence.copy()
+    for group in np.unique(labels):
+        confidence[(labels == group) & (found.labels != group)] = np.median(
+            found.confidence[found.labels == group]
+        )
+    return replace(found, labels=labels, confidence=confidence)

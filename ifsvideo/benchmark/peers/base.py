@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.errors import UsageError
+from ifsvideo.segmentation.shape_interaction import AFFINE_RANK
 from ifsvideo.types import BACKGROUND, UNDECIDED, Segmentation, Tracks
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int64]
-
-AFFINE_RANK = 4
-"""Trajectories of one rigid motion seen by an affine camera span a subspace of so many dimensions."""
 
 
 @dataclass(frozen=True)
@@ -80,21 +78,6 @@ class Peer(ABC):
         (P,) int64
             Group of each trajectory, 0 ... motions - 1 in any order; a group may be empty.
         """
-
-
-def normalised(tracks: Tracks) -> Floats:
-    """Trajectory matrix (2F, P) of complete tracks with the picture's sides at -1 and 1.
-
-    These are the coordinates x of Hopkins-155. Where the size of the picture is not known, the extent of
-    the points stands in.
-    """
-    if tracks.size is None:
-        low, high = tracks.xy.min(axis=(0, 1)), tracks.xy.max(axis=(0, 1))
-    else:
-        low, high = np.zeros(2), np.array(tracks.size, dtype=np.float64)
-    centre, half = (low + high) / 2, np.maximum((high - low) / 2, 1e-9)
-    scaled = Tracks.from_array((tracks.xy - centre) / half)
-    return scaled.W
 
 
 def by_size(labels: Labels) -> Labels:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ifsvideo.benchmark.peers.base import AFFINE_RANK, Floats, Labels, Peer
+from ifsvideo.benchmark.peers.base import Floats, Labels, Peer
+from ifsvideo.segmentation.shape_interaction import AFFINE_RANK
 from ifsvideo.types import Tracks
 
 Subspace = NDArray[np.float64]

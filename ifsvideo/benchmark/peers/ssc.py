@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ifsvideo.benchmark.peers import spectral
-from ifsvideo.benchmark.peers.base import Floats, Labels, Peer, normalised
+from ifsvideo.benchmark.peers.base import Floats, Labels, Peer
+from ifsvideo.segmentation.shape_interaction import normalised
 from ifsvideo.types import Tracks
 
 _EPS = float(np.finfo(np.float64).eps)
