@@ -134,6 +134,24 @@ def some_maps(frames: int, seed: int = 0) -> Array:
     return np.eye(2, 3) + grown * rate
 
 
+def affine_motions(
+    sizes: tuple[int, ...] = (60, 40), frames: int = 15, noise: float = 0.05, seed: int = 0
+) -> tuple[Tracks, Ints]:
+    """Clouds that each move by affine cameras of their own, in mixed order, and the cloud of each point."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for size in sizes:
+        cloud = rng.uniform(-1, 1, (size, 3))
+        cameras = rng.normal(size=(1, 2, 3)) + 0.15 * np.cumsum(rng.normal(size=(frames, 2, 3)), axis=0)
+        shift = rng.uniform(150, 330, 2) + np.cumsum(rng.normal(scale=5, size=(frames, 2)), axis=0)
+        parts.append(60 * np.einsum("fij,pj->fpi", cameras, cloud) + shift[:, None])
+    xy = np.concatenate(parts, axis=1)
+    truth = np.repeat(np.arange(len(sizes)), sizes)
+    order = rng.permutation(len(truth))
+    xy += rng.normal(scale=noise, size=xy.shape)
+    return Tracks.from_array(xy[:, order], size=SIZE), truth[order]
+
+
 def share_wrong(labels: Ints, truth: Ints) -> float:
     """Share of points that the best one-to-one matching of labels to motions gets wrong."""
     rows, columns = np.unique(labels), np.unique(truth)

@@ -10,33 +10,16 @@ import pytest
 
 from ifsvideo.benchmark import datasets, metrics
 from ifsvideo.benchmark.peers import PEERS, PeerFactory
-from ifsvideo.benchmark.peers.base import by_size, normalised
-from ifsvideo.benchmark.peers.spectral import discretised_cut, k_means, leading
+from ifsvideo.benchmark.peers.base import by_size
+from ifsvideo.benchmark.peers.spectral import k_means, leading
 from ifsvideo.benchmark.peers.ssc import SparseSubspaceClustering, strongest
 from ifsvideo.errors import UsageError
+from ifsvideo.segmentation.shape_interaction import normalised
 from ifsvideo.types import UNDECIDED, Tracks
+from tests.scenes import SIZE, affine_motions
 
-SIZE = (640, 480)
 HOPKINS = Path(__file__).resolve().parents[2] / "shared" / "datasets" / "hopkins155"
 EVERY_PEER = pytest.mark.parametrize("name", sorted(PEERS))
-
-
-def affine_motions(
-    sizes: tuple[int, ...] = (60, 40), frames: int = 15, noise: float = 0.05, seed: int = 0
-) -> tuple[Tracks, np.ndarray]:
-    """Clouds that each move by affine cameras of their own, in mixed order, and the cloud of each point."""
-    rng = np.random.default_rng(seed)
-    parts = []
-    for size in sizes:
-        cloud = rng.uniform(-1, 1, (size, 3))
-        cameras = rng.normal(size=(1, 2, 3)) + 0.15 * np.cumsum(rng.normal(size=(frames, 2, 3)), axis=0)
-        shift = rng.uniform(150, 330, 2) + np.cumsum(rng.normal(scale=5, size=(frames, 2)), axis=0)
-        parts.append(60 * np.einsum("fij,pj->fpi", cameras, cloud) + shift[:, None])
-    xy = np.concatenate(parts, axis=1)
-    truth = np.repeat(np.arange(len(sizes)), sizes)
-    order = rng.permutation(len(truth))
-    xy += rng.normal(scale=noise, size=xy.shape)
-    return Tracks.from_array(xy[:, order], size=SIZE), truth[order]
 
 
 # In five dimensions three subspaces of four share much of what they span: RANSAC's published weakness.
@@ -133,13 +116,6 @@ def test_by_size() -> None:
     assert by_size(np.array([1, 0])).tolist() == [1, 0]
 
 
-@pytest.mark.parametrize("size", [SIZE, None])
-def test_normalised(size: tuple[int, int] | None) -> None:
-    corners = np.array([[[0.0, 0.0], [640.0, 480.0], [320.0, 240.0]]] * 2)
-    W = normalised(Tracks.from_array(corners, size=size))
-    assert W.tolist() == [[-1, 1, 0]] * 4
-
-
 def test_strongest_keeps_the_share() -> None:
     column = np.array([[0.1], [-0.6], [0.3], [0.0]])
     assert strongest(column, 0.5).ravel().tolist() == [0, -0.6, 0, 0]
@@ -164,20 +140,6 @@ def test_leading_eigenvalues_count_the_blocks() -> None:
     values, vectors = leading(blocks, 4)
     np.testing.assert_allclose(values, [1, 1, 1, 0], atol=1e-12)
     assert vectors.shape == (15, 4)
-
-
-def test_discretised_cut_finds_blocks() -> None:
-    truth = np.random.default_rng(0).integers(0, 3, 40)
-    affinity = np.where(truth[:, None] == truth, 1.0, 0.05)
-    assert metrics.error(discretised_cut(affinity, 3), truth + 1) == 0
-
-
-def test_discretised_cut_spends_no_group_on_a_stray() -> None:
-    truth = np.repeat([0, 1], 20)
-    affinity = np.where(truth[:, None] == truth, 1.0, 0.05)
-    affinity[0, 1:] = affinity[1:, 0] = 1e-3
-    assert np.bincount(discretised_cut(affinity, 2)).min() >= 19
-    assert np.bincount(discretised_cut(affinity, 2, offset=0.0)).min() == 1
 
 
 def test_k_means_finds_clouds() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.segmenter import IFSSegmenter
-from ifsvideo.segmentation.smoothing import noise_of, smoothed
+from ifsvideo.segmentation.smoothing import noise_of, smoothed, without_gaps
 from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, Camera, Scene, make_scene, share_wrong
 
@@ -67,3 +67,21 @@ def test_cars_are_found_among_noise_in_which_they_drown_otherwise() -> None:
         scenes = [scene_of(1.5, seed=seed) for seed in range(4)]
         wrong[strength] = np.mean([share_wrong(segmenter.segment(s.tracks).labels, s.truth) for s in scenes])
     assert wrong[STRENGTH] < 0.5 * wrong[0.0]
+
+
+def test_gaps_are_filled_beside_the_common_path() -> None:
+    tracks = scene_of(0.0, shake=0.02).tracks
+    visible = tracks.visible.copy()
+    visible[10:13, 4] = visible[:3, 5] = visible[-3:, 6] = False
+    xy = np.where(visible[..., None], tracks.xy, np.nan)
+    filled = without_gaps(replace(tracks, xy=xy, visible=visible))
+    assert filled.visible.all()
+    assert np.array_equal(filled.xy[visible], tracks.xy[visible])
+    # The camera shakes by 10 pixels; a line through the gap alone would miss that.
+    assert np.abs(filled.xy[10:13, 4] - tracks.xy[10:13, 4]).max() < 1
+    assert np.abs(filled.xy[:, 5:7] - tracks.xy[:, 5:7]).max() < 5
+
+
+def test_tracks_without_gaps_stay_as_they_are() -> None:
+    tracks = scene_of(0.1).tracks
+    assert without_gaps(tracks) is tracks

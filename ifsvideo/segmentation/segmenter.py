@@ -141,7 +141,8 @@ class IFSSegmenter:
                 reach = config.gap * unit
                 labels, confidence = contested(labels, confidence, window, world, cues, reach)
             if self.alone:
-                details |= {"doubt": merging.doubt, "apart": apart_from_each_other(labels, window, merging)}
+                apart = apart_from_each_other(labels, window, merging)
+                details |= {"doubt": merging.doubt, "apart": apart, "world": world}
             evidence = cues.evidence
             details |= {"window": window, "joined": joined, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}

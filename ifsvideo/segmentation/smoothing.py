@@ -70,13 +70,12 @@ def without_gaps(tracks: Tracks) -> Tracks:
     """
     if tracks.visible.all():
         return tracks
-    path, frames = _common_path(tracks), np.arange(tracks.frames)
-    xy = tracks.xy.copy()
+    path, xy = _common_path(tracks), tracks.xy.copy()
     for point in np.flatnonzero(~tracks.visible.all(axis=0)):
-        seen = np.flatnonzero(tracks.visible[:, point])
+        seen, gaps = np.flatnonzero(tracks.visible[:, point]), np.flatnonzero(~tracks.visible[:, point])
         beside = xy[seen, point] - path[seen]
         for axis in (0, 1):
-            xy[:, point, axis] = np.interp(frames, seen, beside[:, axis]) + path[:, axis]
+            xy[gaps, point, axis] = np.interp(gaps, seen, beside[:, axis]) + path[gaps, axis]
     return replace(tracks, xy=xy, visible=np.ones_like(tracks.visible))
 
 

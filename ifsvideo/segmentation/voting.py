@@ -1,12 +1,13 @@
-"""What is doubtful is asked twice: of a cut of all points at once, then of chance, again and again.
+"""What is doubtful is asked of a cut of all points at once, then of chance, until something is found twice.
 
 Models are sampled at random, and where a thing hardly moves it is up to them whether its segments are pure
 enough to be told from the ground. No score of a single segmentation tells whether it is right
 (`ifsvideo/benchmark/TRIED.md`). But a cut of all points at once, told their number of motions, is another
 view of the same tracks (`ifsvideo.segmentation.whole`), and what both find is hardly ever wrong. So the first
-segmentation that it confirms stands. One motion too many, the ground in two parts, is often confirmed as
-well; then the cut into one motion fewer confirms the ground in one, and how likely the two parts are apart
-decides.
+segmentation stands that it confirms, or that is found again. One motion too many, the ground in two parts,
+is often confirmed as well; then the cut into one motion fewer confirms the ground in one, and how likely the
+two parts are apart decides. Where the number is settled, but the cut is another, it is told how well the
+points fit their groups: a group that is one motion is a static world, seen from itself.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import logit
 
 from ifsvideo.segmentation.whole import Whole
+from ifsvideo.segmentation.world import World
 from ifsvideo.types import BACKGROUND, Segmentation
 
 Labels = NDArray[np.int64]
@@ -30,22 +32,25 @@ _SURE = 0.05
 of its number of motions; half of Hopkins-155 are."""
 _ALIKE = 0.02
 """Share of the points by which two segmentations may differ and be the same. A single point always may."""
+_EXPLAINED = 2.0
+"""Error of a point in the world of its group, in tolerances, from which on it is not explained, however far
+it is off; 1 to 10 choose alike."""
 
 
 def voted(
     segment: Callable[[], Segmentation], votes: int, whole: Whole, motions: int | None = None
 ) -> Segmentation:
-    """The first segmentation that a cut of all points confirms; where none is, that which resembles all most.
+    """The first segmentation that a cut of all points confirms, that is found again or is sure of its number
+    of motions; where none is, that which resembles all most.
 
-    One that is sure of its number of motions stands at once, and so does the one in the middle in the end: as
-    it is, or as the cut into as many motions has it, whichever fits better.
+    What the cut does not confirm is taken as the cut into as many motions has it, if that fits better.
 
     Parameters
     ----------
     segment : callable
         Makes one, another one each time. Of ``details`` these are read: ``doubt``, how likely its most
         doubtful decision is wrong, without which the first one stands as it is; ``apart`` (G, G), how likely
-        each two of its groups are two motions.
+        each two of its groups are two motions; ``world``, where the worlds of all groups start from, or None.
     votes : int
         How many are made at most; of one nothing is asked.
     whole : Whole
@@ -64,6 +69,9 @@ def voted(
         joined = one if sure or motions is not None else _with_one_ground(one, whole)
         if joined is not one or _confirmed(one.labels, whole):
             return joined
+        for before in found:
+            if _alike(before.labels, one.labels):
+                return _fitting(before, whole)
         found.append(one)
     away = [sum(difference(one.labels, other.labels) for other in found) for one in found]
     return _fitting(found[int(np.argmin(away))], whole)
@@ -134,11 +142,17 @@ def _joined(found: Segmentation, first: int, second: int) -> Segmentation:
 
 
 def _fitting(found: Segmentation, whole: Whole) -> Segmentation:
-    """The segmentation, or the cut into as many motions if that is another one and fits better."""
-    cut = whole.cut(len(np.unique(found.labels)))
-    if cut is None or _alike(found.labels, cut.labels):
+    """The segmentation, or the cut into as many motions if that is another one and fits better.
+
+    Both before an affine camera, whose subspaces mislead where a street goes on into the distance, and before
+    one that sees in perspective, whose worlds are sometimes not found.
+    """
+    world, cut = found.details["world"], whole.cut(len(np.unique(found.labels)))
+    if world is None or cut is None or _alike(found.labels, cut.labels):
         return found
-    if whole.misfit(found.labels) <= whole.misfit(cut.labels):
+    if whole.misfit(cut.labels) >= whole.misfit(found.labels):
+        return found
+    if _misfit(cut.labels, world) >= _misfit(found.labels, world):
         return found
     labels = _named_alike(cut.labels, found.labels)
     confidence = found.confidence.copy()
@@ -147,3 +161,16 @@ def _fitting(found: Segmentation, whole: Whole) -> Segmentation:
             found.confidence[found.labels == group]
         )
     return replace(found, labels=labels, confidence=confidence)
+
+
+def _misfit(labels: Labels, world: World) -> float:
+    """How badly the points fit the perspective worlds of their groups, each fitted to these points alone.
+
+    As `Whole.misfit`, but in tolerances.
+    """
+    error = np.zeros(len(labels))
+    for group in np.unique(labels):
+        members = np.flatnonzero(labels == group)
+        own = world.fitted_to(members)
+        error[members] = np.nan_to_num(own.rms / own.tolerance)[members]
+    return float(np.minimum(error, _EXPLAINED).mean())

@@ -29,7 +29,7 @@ class Whole:
     Parameters
     ----------
     tracks : Tracks
-        A track's gaps are filled in time for the cut; nowhere else.
+        Their gaps are filled in time for the cut; what fits is told by what was measured alone.
     """
 
     def __init__(self, tracks: Tracks) -> None:
@@ -41,7 +41,7 @@ class Whole:
     def cut(self, motions: int) -> Cut | None:
         """All points divided into so many motions; None where that cannot be told, for one motion, in less
         than three frames, or with less than five points a motion."""
-        enough = len(self._W) > AFFINE_RANK and self._tracks.points >= (AFFINE_RANK + 1) * motions
+        enough = 2 * self._tracks.frames > AFFINE_RANK and self._tracks.points >= (AFFINE_RANK + 1) * motions
         if motions < 2 or not enough:
             return None
         if self._interaction is None:
@@ -55,7 +55,8 @@ class Whole:
     def misfit(self, labels: NDArray[np.int64]) -> float:
         """Mean distance of the points from the rank-3 subspaces of their groups (P,), pixels a frame.
 
-        Tells which of two segmentations with as many groups is better; with more groups it is always less.
+        Tells which of two segmentations with as many groups is better before an affine camera; with more
+        groups it is always less.
         """
         distance = np.zeros(len(labels))
         for group in np.unique(labels):
@@ -63,4 +64,4 @@ class Whole:
             if len(members) > 1:
                 W, seen = self._W[:, members], self._seen[:, members]
                 distance[members] = Subspace.fit(W, seen, _RIGID).distance(W, seen)
-        return float(distance.mean()) if len(labels) else 0.0
+        return float(distance.mean())
