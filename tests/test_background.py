@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ifsvideo.segmentation.agglomeration import Agglomeration, Window
-from ifsvideo.segmentation.background import merge_and_label
+from ifsvideo.segmentation.background import apart_from_each_other, merge_and_label
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.cues import Cues
 from ifsvideo.segmentation.similarity import learnt
@@ -60,3 +60,22 @@ def test_a_part_too_small_to_be_believed_goes_to_the_background_and_joins_nothin
     labels = labels_of(few, replace(CONFIG, gap_doubt=0.9))
     assert not labels[few.truth == 2].any()
     assert (labels[few.truth == 1] == 1).all()
+
+
+def test_how_likely_labels_are_two_motions(scene: Scene) -> None:
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    assert world is not None
+    cues = Cues(scene.tracks, scene.tracks.xy[0], world.evidence(5.0), world.nearness, 1.0, 10)
+    window = Window(scene.truth, np.ones(len(scene.truth), dtype=bool), SIZE)
+    merging = Agglomeration(cues, learnt().final)
+    merging.run(window)
+    # The ground, its upper half apart from it, the lorry, and a number that no point has.
+    upper = (scene.truth == 0) & (scene.tracks.xy[0, :, 1] < np.median(scene.tracks.xy[0, :, 1]))
+    labels = np.where(upper, 2, np.where(scene.truth > 0, 4, 0))
+    apart = apart_from_each_other(labels, window, merging)
+    assert apart.shape == (5, 5)
+    assert np.array_equal(apart, apart.T)
+    assert apart[0, 2] < 0.1
+    assert apart[0, 4] > 0.9
+    assert apart[2, 4] > 0.9
+    assert (apart[[1, 3]] == 1).all()

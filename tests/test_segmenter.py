@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,9 +10,12 @@ import numpy as np
 import pytest
 
 from ifsvideo.errors import UsageError
+from ifsvideo.segmentation.agglomeration import Agglomeration
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.segmenter import IFSSegmenter
-from ifsvideo.types import Tracks
+from ifsvideo.segmentation.shape_interaction import Cut
+from ifsvideo.segmentation.whole import Whole
+from ifsvideo.types import Segmentation, Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, SIZE, Camera, Mover, Scene, make_scene, share_wrong
 
 THESIS = SegmenterConfig.thesis()
@@ -146,10 +150,11 @@ def odd_inputs() -> dict[str, Tracks]:
 
 
 @BOTH
+@pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize("name", odd_inputs())
-def test_odd_input_neither_fails_nor_warns(name: str, config: SegmenterConfig) -> None:
+def test_odd_input_neither_fails_nor_warns(name: str, alone: bool, config: SegmenterConfig) -> None:
     tracks = odd_inputs()[name]
-    result = IFSSegmenter(config).segment(tracks)
+    result = IFSSegmenter(config, alone=alone).segment(tracks)
     assert result.labels.shape == (tracks.points,)
     assert result.labels.dtype == np.int64
     undecided = tracks.visible.sum(axis=0) < 2
@@ -158,11 +163,12 @@ def test_odd_input_neither_fails_nor_warns(name: str, config: SegmenterConfig) -
     assert np.isfinite(result.confidence).all()
 
 
+@pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize(
     "name", ["no points", "two frames", "one point", "three points", "coincident", "wild"]
 )
-def test_a_known_number_of_motions_of_odd_input(name: str) -> None:
-    labels = IFSSegmenter().segment(odd_inputs()[name], 2).labels
+def test_a_known_number_of_motions_of_odd_input(name: str, alone: bool) -> None:
+    labels = IFSSegmenter(alone=alone).segment(odd_inputs()[name], 2).labels
     assert set(labels.tolist()) <= {0, 1}
 
 
@@ -226,6 +232,46 @@ def test_coordinates_may_count_from_the_middle_of_the_picture(origin: tuple[floa
     xy = scene.tracks.xy - np.array(origin)
     result = IFSSegmenter().segment(Tracks.from_array(xy, scene.tracks.visible))
     assert share_wrong(result.labels, scene.truth) < 0.05
+
+
+def test_what_its_votes_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a sequence of its own: how sure it is, and the tracks as its stages see them, without much noise."""
+    given: list[tuple[Segmentation, int, Whole, int | None]] = []
+
+    def voted(segment: Callable[[], Segmentation], votes: int, whole: Whole, motions: int | None) -> Any:
+        given.append((segment(), votes, whole, motions))
+        return given[-1][0]
+
+    monkeypatch.setattr("ifsvideo.segmentation.segmenter.voted", voted)
+    scene = make_scene(movers=(LEFT_CAR,), noise=1.0)
+    IFSSegmenter().segment(scene.tracks)
+    assert not given
+    IFSSegmenter(SegmenterConfig(votes=3), alone=True).segment(scene.tracks, 2)
+    ((found, votes, whole, motions),) = given
+    assert (votes, motions) == (3, 2)
+    assert 0 <= found.details["doubt"] < 0.5
+    assert found.details["apart"].shape == (2, 2)
+    assert found.details["apart"][0, 1] > 0.9
+    error = found.details["world"].fitted_to(np.flatnonzero(scene.truth == 0)).rms
+    assert np.median(error[scene.truth == 0]) < 0.5 < np.median(error[scene.truth == 1])
+    noisy = Whole(scene.tracks).misfit(scene.truth)
+    assert whole.misfit(scene.truth) < 0.95 * noisy
+
+
+def test_parts_of_the_ground_that_a_cut_has_as_one_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stage 5 is made to leave the ground in two parts, of which it is not sure."""
+    scene = make_scene(movers=(LEFT_CAR,))
+    right = scene.tracks.xy[0, :, 0] > SIZE[0] / 2
+    parts = np.where(scene.truth == 1, 2, right)
+
+    def split(merging: Agglomeration, *_: Any) -> tuple[np.ndarray, np.ndarray]:
+        merging.doubt = 0.4
+        return parts.astype(np.int64), np.ones(len(parts))
+
+    monkeypatch.setattr("ifsvideo.segmentation.segmenter.merge_and_label", split)
+    monkeypatch.setattr(Whole, "cut", lambda _, motions: Cut((scene.truth, parts)[motions - 2], 1.0))
+    labels = IFSSegmenter(SegmenterConfig(contest=False), alone=True).segment(scene.tracks).labels
+    assert np.array_equal(labels, scene.truth)
 
 
 @pytest.mark.parametrize(("contest", "alone"), [(True, True), (False, True), (True, False)])
