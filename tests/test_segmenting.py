@@ -54,7 +54,7 @@ def test_one_window_is_voted_on_and_windows_of_a_drive_are_not(monkeypatch: pyte
         made.append(tracks.points)
         labels = np.arange(tracks.points) % (1 + len(made))
         sure, still = np.ones(len(labels)), labels == 0
-        return Segmentation(labels, still, labels, sure, {"doubt": 0.5})
+        return Segmentation(labels, still, labels, sure, {"doubt": 0.5, "world": None})
 
     monkeypatch.setattr(IFSSegmenter, "_stages", run)
     tracks = make_scene(static=20).tracks

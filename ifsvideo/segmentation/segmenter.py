@@ -71,7 +71,7 @@ class IFSSegmenter:
         confidence = np.zeros(tracks.points)
         details: dict[str, Any] = {}
         if len(usable):
-            chosen, size = self._prepared(tracks.select(usable))
+            chosen, size = self._in_a_straight_picture(tracks.select(usable))
             rng = np.random.default_rng(self.seed)
 
             def stages() -> Segmentation:
@@ -83,18 +83,18 @@ class IFSSegmenter:
             details = dict(part.details, usable=usable)
         return Segmentation(labels, background, segments, confidence, details)
 
-    def _prepared(self, tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
-        """What all stages start from: tracks as a straight lens would have them, without much noise, and the
-        size of their picture."""
+    def _in_a_straight_picture(self, tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
+        """Tracks as a straight lens would have them, and the size of their picture."""
         tracks, size = in_a_picture(tracks)
         if self.config.distortion:
             tracks = replace(tracks, xy=undistort(tracks.xy, size, self.config.distortion))
-        return smoothed(tracks, self.config.smoothing, _unit(size)), size
+        return tracks, size
 
     def _stages(
         self, tracks: Tracks, size: tuple[int, int], motions: int | None, rng: np.random.Generator
     ) -> Segmentation:
-        config, unit = self.config, _unit(size)
+        config, unit = self.config, float(np.hypot(*size)) / 800
+        tracks = smoothed(tracks, config.smoothing, unit)
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
@@ -159,11 +159,6 @@ class IFSSegmenter:
         support = epipolar_support(tracks, self.config.epipolar_error * unit, self.seed)
         # Support of one half, the thesis's own limit, is where evidence turns.
         return support, 2 * (1 - support), None
-
-
-def _unit(size: tuple[int, int]) -> float:
-    """Pixels of a picture of this size per pixel of a 640x480 one."""
-    return float(np.hypot(*size)) / 800
 
 
 def in_a_picture(tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:

@@ -17,8 +17,8 @@ from ifsvideo.segmentation.shape_interaction import AFFINE_RANK, Cut, ShapeInter
 from ifsvideo.segmentation.smoothing import without_gaps
 from ifsvideo.types import Tracks
 
-_KEY_FRAMES = 12
-"""Frames that are looked at; of all of them the cuts of Hopkins-155 are no better."""
+_KEY_FRAMES = 30
+"""Frames that are looked at: of 12 the cuts of Hopkins-155 are as good, but not where tracks are noisy."""
 _RIGID = 3
 """Dimensions of a rigid motion's trajectories once their mean is taken off (Tomasi and Kanade, IJCV 1992)."""
 
@@ -29,7 +29,8 @@ class Whole:
     Parameters
     ----------
     tracks : Tracks
-        Their gaps are filled in time for the cut; what fits is told by what was measured alone.
+        As they were measured: the cut bears noise better than what smoothing does to them. Their gaps are
+        filled in time for it; what fits is told by what was measured alone.
     """
 
     def __init__(self, tracks: Tracks) -> None:
