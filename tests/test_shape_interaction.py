@@ -26,6 +26,12 @@ def test_the_right_number_is_less_uncertain_than_one_more() -> None:
         assert interaction.cut(3).uncertainty < interaction.cut(4).uncertainty
 
 
+def test_what_is_orthogonal_is_cut_without_uncertainty() -> None:
+    cut = ShapeInteraction(np.kron(np.eye(2), np.ones((3, 10)))).cut(2)
+    assert 0 < cut.uncertainty < 1e-6
+    assert metrics.error(cut.labels, np.repeat([1, 2], 10)) == 0
+
+
 def test_points_beyond_the_most_join_those_that_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     tracks, truth = affine_motions((90, 60))
     whole = ShapeInteraction(coordinates(tracks)).cut(2)

@@ -85,9 +85,10 @@ def test_what_is_confirmed_stands(cut: list[int]) -> None:
     assert chosen(runs(TWO), 5, Cuts(cut)) == TWO
 
 
-def test_one_vote_is_one_run_and_asks_nothing() -> None:
+@pytest.mark.parametrize("votes", [0, 1])
+def test_one_vote_is_one_run_and_asks_nothing(votes: int) -> None:
     whole = Cuts(OTHER)
-    assert chosen(runs(TWO), 1, whole) == TWO
+    assert chosen(runs(TWO), votes, whole) == TWO
     assert not whole.asked
 
 
@@ -203,6 +204,7 @@ def test_no_more_runs_are_made_than_asked_for() -> None:
         (ONE, TWO, 0.5),
         ([0] * 5 + [1] * 5, list(range(10)), 0.8),
         ([0] * 5 + [1] * 5, [-1] * 5 + [1] * 4 + [0], 0.1),
+        ([0] * 6 + [1] * 4, [-1] * 10, 0.4),
         ([], [], 0.0),
     ],
 )

@@ -48,7 +48,7 @@ class Cut:
         Group of each trajectory, from 0, in any order; a group may be empty.
     uncertainty : float
         The affinity that the cut severs over the gap after the last eigenvalue that is used: a bound on how
-        far noise turns the eigenvectors (perturbation theory).
+        far noise turns the eigenvectors (perturbation theory). Above 0.
     """
 
     labels: Labels
@@ -91,7 +91,7 @@ class ShapeInteraction:
         labels, gap = discretised_cut(affinity, motions)
         groups = np.eye(motions)[labels]
         severed = affinity.sum() - np.einsum("pk,pk->", groups, affinity @ groups)
-        return Cut(labels, float(severed) / max(gap, _EPS))
+        return Cut(labels, max(float(severed), _EPS) / max(gap, _EPS))
 
 
 def _sharpened(products: Array) -> Array:

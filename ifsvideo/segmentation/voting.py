@@ -59,9 +59,9 @@ def voted(
         Number of motions, where it is known: none are joined then.
     """
     found: list[Segmentation] = []
-    while len(found) < votes:
+    for _ in range(max(votes, 1)):
         one = segment()
-        if votes == 1 or "doubt" not in one.details:
+        if votes <= 1 or "doubt" not in one.details:
             return one
         sure = one.details["doubt"] <= _SURE
         if sure and not found:
@@ -85,12 +85,12 @@ def difference(one: Labels, other: Labels) -> float:
 
 
 def _named_alike(one: Labels, other: Labels) -> Labels:
-    """One labelling (P,) with the numbers of those groups of another that share most points; -1 what has no
-    counterpart."""
+    """One labelling (P,) with the numbers of those groups of another that share most points; what has no
+    counterpart has a number that is none."""
     (names, rows), (others, columns) = (np.unique(labels, return_inverse=True) for labels in (one, other))
     shared = np.zeros((len(names), len(others)), dtype=np.int64)
     np.add.at(shared, (rows, columns), 1)
-    counterpart = np.full(len(names), -1, dtype=np.int64)
+    counterpart = np.full(len(names), np.iinfo(np.int64).min, dtype=np.int64)
     matched, to = linear_sum_assignment(shared, maximize=True)
     counterpart[matched] = others[to]
     return np.asarray(counterpart[rows])
