@@ -78,8 +78,11 @@ def test_gaps_are_filled_beside_the_common_path() -> None:
     assert filled.visible.all()
     assert np.array_equal(filled.xy[visible], tracks.xy[visible])
     # The camera shakes by 10 pixels; a line through the gap alone would miss that.
-    assert np.abs(filled.xy[10:13, 4] - tracks.xy[10:13, 4]).max() < 1
-    assert np.abs(filled.xy[:, 5:7] - tracks.xy[:, 5:7]).max() < 5
+    assert np.abs(filled.xy[10:13, 4] - tracks.xy[10:13, 4]).max() < 2
+    # At the ends a point goes as most do, not as far as its own depth would have it.
+    for frames, point, last in ((slice(3), 5, 3), (slice(-3, None), 6, -4)):
+        missed = np.abs(tracks.xy[frames, point] - filled.xy[frames, point]).max()
+        assert missed < 0.7 * np.abs(tracks.xy[frames, point] - tracks.xy[last, point]).max()
 
 
 def test_tracks_without_gaps_stay_as_they_are() -> None:

@@ -137,6 +137,7 @@ def test_where_the_cut_into_as_many_motions_fits_better_it_is_taken(
     whole.affine = OTHER
     found = voted(runs(*made, doubt=doubt, true=OTHER), 3, cast(Whole, whole))
     assert found.labels.tolist() == OTHER
+    assert chosen(runs(*made, doubt=doubt, true=OTHER), 3, whole, motions=2) == TWO
     # As sure as the group that they go to.
     assert found.confidence == pytest.approx(0.1 * (5 + np.array(OTHER)))
 

@@ -56,25 +56,30 @@ def voted(
     whole : Whole
         The same tracks as a whole.
     motions : int, optional
-        Number of motions, where it is known: none are joined then.
+        Number of motions, where it is known: none are joined then, nor is the cut ever taken, for what is
+        told is seldom what is seen to move.
     """
     found: list[Segmentation] = []
+
+    def settled(one: Segmentation) -> Segmentation:
+        return one if motions is not None else _fitting(one, whole)
+
     for _ in range(max(votes, 1)):
         one = segment()
         if votes <= 1 or "doubt" not in one.details:
             return one
         sure = one.details["doubt"] <= _SURE
         if sure and not found:
-            return _fitting(one, whole)
+            return settled(one)
         joined = one if sure or motions is not None else _with_one_ground(one, whole)
         if joined is not one or _confirmed(one.labels, whole):
             return joined
         for before in found:
             if _alike(before.labels, one.labels):
-                return _fitting(before, whole)
+                return settled(before)
         found.append(one)
     away = [sum(difference(one.labels, other.labels) for other in found) for one in found]
-    return _fitting(found[int(np.argmin(away))], whole)
+    return settled(found[int(np.argmin(away))])
 
 
 def difference(one: Labels, other: Labels) -> float:
