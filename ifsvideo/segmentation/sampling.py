@@ -68,7 +68,8 @@ def sample_models(
         At most ``config.models``; fewer where no disk holds three points.
     """
     window = _Window.of(tracks, base)
-    usable, place = window.usable, window.place.T
+    usable, (x, y) = window.usable, window.place
+    radius = config.disk_radius * unit
     pools = [np.flatnonzero(usable & ~background), np.flatnonzero(usable & background)]
     inliers: list[Bools] = []
     controls: list[NDArray[np.float64]] = []
@@ -76,21 +77,22 @@ def sample_models(
     # A disk may hold fewer than three points or only collinear ones; give up after as many failures as
     # models.
     for _ in range(2 * config.models):
-        if len(inliers) == config.models or not usable.any():
+        if len(inliers) == config.models or not len(pools[0]) + len(pools[1]):
             break
         fg = bool(rng.random() < config.foreground_share)
         pool = pools[0] if (fg and len(pools[0])) or not len(pools[1]) else pools[1]
         fg = pool is pools[0]
-        centre = int(rng.choice(pool))
-        distance = np.linalg.norm(place - place[centre], axis=1)
-        support = np.flatnonzero(usable & (distance < config.disk_radius * unit))  # eq. 3.1
+        centre = int(pool[rng.integers(len(pool))])
+        support = np.flatnonzero(
+            usable & ((x - x[centre]) ** 2 + (y - y[centre]) ** 2 < radius**2)
+        )  # eq. 3.1
         through = centre if config.through_centre else None
         best = _best_triple(window, support, through, unit, config, rng)
         if best is not None:
             mask = np.zeros(tracks.points, dtype=bool)
             mask[best[0]] = True
             inliers.append(mask)
-            controls.append(place[best[1]])
+            controls.append(window.place[:, best[1]].T)
             foreground.append(fg)
     return AffineModels(
         np.array(inliers, dtype=bool).reshape(len(inliers), tracks.points),
@@ -101,19 +103,31 @@ def sample_models(
 
 @dataclass(frozen=True)
 class _Window:
-    """The tracks with the points last: place (2, P) in the base frame, usable (P,) whether they are seen
-    there; path (2 (F - 1), P), x and y in turn, and seen (F - 1, P) in the other frames."""
+    """The tracks with the points last.
+
+    Attributes
+    ----------
+    place : (2, P) float
+        In the base frame.
+    usable : (P,) bool
+        Whether they are seen there.
+    path : (2 (F - 1), P) float
+        In the other frames, all x first.
+    seen : (F - 1, P) float
+        One where they are seen there, else zero.
+    """
 
     place: NDArray[np.float64]
     usable: Bools
     path: NDArray[np.float64]
-    seen: Bools
+    seen: NDArray[np.float64]
 
     @classmethod
     def of(cls, tracks: Tracks, base: int) -> _Window:
         other = np.arange(tracks.frames) != base  # the base frame maps to itself
-        path = tracks.xy[other].transpose(0, 2, 1).reshape(2 * other.sum(), tracks.points)
-        return cls(tracks.xy[base].T.copy(), tracks.visible[base], path, tracks.visible[other])
+        path = tracks.xy[other].transpose(2, 0, 1).reshape(2 * other.sum(), tracks.points)
+        seen = tracks.visible[other].astype(np.float64)
+        return cls(tracks.xy[base].T.copy(), tracks.visible[base], path, seen)
 
 
 def _best_triple(
@@ -129,34 +143,59 @@ def _best_triple(
     ``through`` names a point that must be one of the three."""
     if len(support) < 3:
         return None
-    triples = np.array([rng.choice(len(support), 3, replace=False) for _ in range(config.ransac_iterations)])
+    triples = _triples(len(support), config.ransac_iterations, rng)
     if through is not None:
         own = int(np.searchsorted(support, through))
         triples[~(triples == own).any(axis=1), 0] = own
     place = window.place[:, support]
-    first = place[:, triples[:, 0]]
-    (x1, y1), (x2, y2) = (place[:, triples[:, k]] - first for k in (1, 2))
+    corners = place[:, triples]  # (2, T, 3)
+    first = corners[..., 0]
+    (x1, x2), (y1, y2) = (corners[..., 1:] - first[..., None]).transpose(0, 2, 1)
     twice_area = x1 * y2 - y1 * x2
     wide = np.abs(twice_area) / 2 > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2
-    if not wide.any():
-        return None
-    triples = triples[wide]
+    if not wide.all():
+        if not wide.any():
+            return None
+        triples, first, twice_area = triples[wide], first[:, wide], twice_area[wide]
+        x1, x2, y1, y2 = x1[wide], x2[wide], y1[wide], y2[wide]
     # eq. 3.2: A_{1->f} = [c_f; 1] [c_1; 1]^-1, so a point is transferred by its barycentric coordinates in
     # c_1.
-    x, y = place[:, None] - first[:, wide, None]
-    (x1, y1), (x2, y2) = ((p[wide, None], q[wide, None]) for p, q in ((x1, y1), (x2, y2)))
-    second, third = np.array([x * y2 - y * x2, x1 * y - y1 * x]) / twice_area[wide, None]
-    barycentric = np.stack([1 - second - third, second, third], axis=1)
+    x, y = place[:, None] - first[..., None]
+    barycentric = np.empty((len(triples), 3, len(support)))
+    area = twice_area[:, None]
+    barycentric[:, 1] = (x * y2[:, None] - y * x2[:, None]) / area
+    barycentric[:, 2] = (x1[:, None] * y - y1[:, None] * x) / area
+    barycentric[:, 0] = 1 - barycentric[:, 1] - barycentric[:, 2]
     path, seen = window.path[:, support], window.seen[:, support]
-    error = (
-        path[:, triples].transpose(1, 0, 2) @ barycentric
-    )  # (T, 2 (F - 1), P), NaN where a corner is unseen
+    # (T, 2 (F - 1), P), NaN where a corner is unseen
+    error = path[:, triples].transpose(1, 0, 2) @ barycentric
     error -= path
     np.multiply(error, error, out=error)
-    fits = error[:, ::2] + error[:, 1::2] < (config.inlier_error * unit) ** 2
-    counted = seen[:, triples].all(axis=2).T.astype(np.float64) @ seen
+    frames = len(seen)
+    error[:, :frames] += error[:, frames:]
+    fits = error[:, :frames] < (config.inlier_error * unit) ** 2
+    counted = seen[:, triples].prod(axis=2).T @ seen
     inlier = (fits.sum(axis=1) >= 0.5 * counted) & (counted > 0)
     winner = int(np.argmax(inlier.sum(axis=1)))
     chosen = np.array(inlier[winner])
     chosen[triples[winner]] = True
     return support[chosen], support[triples[winner]]
+
+
+_ORDERS = np.array([[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[1, 0, 2], [0, 1, 2]]])
+"""What becomes of three things when the last and then the middle one change places with one up to it."""
+
+
+def _triples(points: int, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Three different ones of so many points, in any order, so many times (T, 3).
+
+    By Floyd's algorithm, as numpy's `Generator.choice` has it for one triple: of numbers that are drawn from
+    ever more, one that was drawn before stands for the last of them.
+    """
+    most = np.array([points - 3, points - 2, points - 1, 2, 1])
+    drawn = rng.integers(0, np.broadcast_to(most, (count, 5)), endpoint=True)
+    first, second, third = drawn[:, :3].T
+    second[second == first] = points - 2
+    third[(third == first) | (third == second)] = points - 1
+    order: NDArray[np.int64] = _ORDERS[drawn[:, 3], drawn[:, 4]]
+    return np.asarray(drawn[np.arange(count)[:, None], order])
