@@ -25,7 +25,8 @@ def shear_and_stretch(
     shear, stretch : (F-1, E) float
         Absolute changes; NaN where an end is not seen in both frames.
     """
-    x, y = np.moveaxis(tracks.xy[:, edges[:, 1]] - tracks.xy[:, edges[:, 0]], 2, 0)
+    start, end = edges.T
+    x, y = tracks.planes.take(end, axis=2) - tracks.planes.take(start, axis=2)
     cross = x[:-1] * y[1:] - y[:-1] * x[1:]
     shear = np.abs(np.arctan2(cross, x[:-1] * x[1:] + y[:-1] * y[1:]))
     return shear, np.abs(np.diff(np.sqrt(x * x + y * y), axis=0))
