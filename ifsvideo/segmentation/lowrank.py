@@ -63,6 +63,8 @@ class Subspace:
         """The subspace of fewer dimensions in which most of the trajectories' (2F, P) spread lies."""
         if rank >= self.rank:
             return self
+        if seen.all():
+            return Subspace(self.directions[:, :rank], self.mean)  # `fit` has them in this order
         inside = self._coordinates(W, seen)
         mean = inside.mean(axis=1)
         spread = self.directions @ principal(inside - mean[:, None], self.rank)
@@ -89,6 +91,10 @@ class Subspace:
     def _coordinates(self, W: Array, seen: Array) -> Array:
         """Coordinates (rank, P) of the nearest points of the subspace."""
         M, rank, points = self.directions, self.rank, W.shape[1]
+        if seen.all():  # one system for all points
+            left = M.T @ M
+            left.flat[:: rank + 1] += 1e-6 * (np.trace(left) + 1e-9)
+            return np.asarray(np.linalg.solve(left, M.T @ (W - self.mean[:, None])), np.float64)
         products = (M[:, :, None] * M[:, None]).reshape(len(M), rank**2)
         sums = np.hstack([products, M * self.mean[:, None]]).T @ seen
         left, means = sums[: rank**2].reshape(rank, rank, points), sums[rank**2 :]
