@@ -29,6 +29,8 @@ _NEAREST = 0.05
 """Least depth q_z relative to that in the reference frame; keeps a diverging step finite."""
 _IDLE = 1e-3
 """Share of the cost by which a step must change it: after two in a row that do not, it is done."""
+_SETTLED = 1e-9
+"""Share of a point's squared error by which a step must change it: else the point has found its place."""
 _GLOBALS = 2
 """Shared unknowns: logarithm of the focal length, radial distortion."""
 
@@ -286,9 +288,11 @@ class Bundle:
 
     def solve_points(self, e: Estimate, iterations: int, nearest: float = np.inf) -> Estimate:
         """Points alone, each by itself, none with an inverse depth over ``nearest``; cameras fixed."""
-        damping = np.full(len(e.X), 1e-3)
+        return self._solve_points(e, iterations, nearest, np.full(len(e.X), 1e-3))
+
+    def _solve_points(self, e: Estimate, iterations: int, nearest: float, damping: Array) -> Estimate:
         seen = self.project(e)
-        for _ in range(iterations):
+        for iteration in range(1, iterations + 1):
             J = self._by_point(e, self._by_place(e, seen, self._shown))
             V = np.einsum("kaip,kbip->abp", J, J)
             g = np.einsum("kaip,kip->ap", J, seen.residual)
@@ -302,10 +306,20 @@ class Bundle:
                 pull = g[:2, beyond] + V[:2, 2, beyond] * (held - e.X[:, 2])[beyond]
                 X[beyond, :2] = e.X[beyond, :2] - Triangles(V[:2, :2, beyond]).solve(pull).T
                 X[:, 2] = held
-            moved = replace(e, X=X)
-            seen_then = self.project(moved)
+            seen_then = self.project(replace(e, X=X))
             better = seen_then.error <= seen.error
             e = replace(e, X=np.where(better[:, None], X, e.X))
+            damping = np.where(better, damping / 10, damping * 10)
+            left = np.flatnonzero(np.abs(seen_then.error - seen.error) > _SETTLED * seen.error)
+            if 2 * len(left) < len(better):
+                # The few that still move go on by themselves.
+                X = e.X.copy()
+                if len(left):
+                    few = replace(e, X=X[left])
+                    X[left] = (
+                        self.subset(left)._solve_points(few, iterations - iteration, nearest, damping[left]).X
+                    )
+                return replace(e, X=X)
             # The points are last in each array.
             seen = (
                 seen_then
@@ -314,7 +328,6 @@ class Bundle:
                     *(np.where(better, x, y) for x, y in zip(_values(seen_then), _values(seen), strict=True))
                 )
             )
-            damping = np.where(better, damping / 10, damping * 10)
         return e
 
     def spread_of_nearness(self, e: Estimate) -> Array:

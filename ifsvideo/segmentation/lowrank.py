@@ -84,17 +84,20 @@ class Subspace:
             Root of the mean square distance per frame, pixels, with the degrees of freedom that the point
             itself spends taken off; 0 where it has no more measurements than those.
         """
-        error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
+        if seen.all():
+            # What is left of trajectories is the same product of all: one system for all points.
+            M, inner = self.directions, self.directions.T @ self.directions
+            inner.flat[:: self.rank + 1] += 1e-6 * (np.trace(inner) + 1e-9)
+            aside = np.eye(len(M)) - M @ np.linalg.solve(inner, M.T)
+            error = aside @ (W - self.mean[:, None])
+        else:
+            error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
         free = np.maximum((seen.sum(axis=0) - self.rank) / 2, 0.5)
         return np.asarray(np.sqrt(np.einsum("fp,fp->p", error, error) / free))
 
     def _coordinates(self, W: Array, seen: Array) -> Array:
         """Coordinates (rank, P) of the nearest points of the subspace."""
         M, rank, points = self.directions, self.rank, W.shape[1]
-        if seen.all():  # one system for all points
-            left = M.T @ M
-            left.flat[:: rank + 1] += 1e-6 * (np.trace(left) + 1e-9)
-            return np.asarray(np.linalg.solve(left, M.T @ (W - self.mean[:, None])), np.float64)
         products = (M[:, :, None] * M[:, None]).reshape(len(M), rank**2)
         sums = np.hstack([products, M * self.mean[:, None]]).T @ seen
         left, means = sums[: rank**2].reshape(rank, rank, points), sums[rank**2 :]
