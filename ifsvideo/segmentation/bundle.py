@@ -115,15 +115,15 @@ class Freed:
 
     Attributes
     ----------
-    reference : int
-        The camera that stays where it is.
+    others : (K - 1,) int
+        The cameras but the reference.
     J : (K, 9, 2, P) float
         Derivatives by each camera and the lens, and the residuals.
     made_up : (P, 3, N + 1) float
         Coordinates of the derivatives by all N = 6 (K - 1) + 2 unknowns, and of the residuals.
     """
 
-    reference: int
+    others: NDArray[np.int64]
     J: Array
     made_up: Array
 
@@ -136,7 +136,7 @@ class Freed:
         the normal equations."""
         root = np.sqrt(weight)
         rows = (self.made_up * root[:, None, None]).reshape(-1, self.made_up.shape[2])
-        left = _normal_equations(self.reference, self.J[None] * root)[0] - rows.T @ rows
+        left = _normal_equations(self.others, self.J[None] * root)[0] - rows.T @ rows
         return left[:-1, :-1], left[:-1, -1]
 
     def square(self, step: Array | None = None) -> Array:
@@ -145,8 +145,7 @@ class Freed:
             residual, missed = self.J[:, -1], self.made_up[..., -1]
         else:
             each = np.zeros((len(self.J), 1, 6 + _GLOBALS + 1))
-            others = np.delete(np.arange(len(self.J)), self.reference)
-            each[others, 0, :6] = step[:-_GLOBALS].reshape(-1, 6)
+            each[self.others, 0, :6] = step[:-_GLOBALS].reshape(-1, 6)
             each[:, 0, 6:-1] = step[-_GLOBALS:]
             each[..., -1] = 1.0
             residual = (each @ self.J.reshape(*self.J.shape[:2], -1)).reshape(len(self.J), 2, -1)
@@ -197,6 +196,8 @@ class Bundle:
         self.lens_spread = lens_spread
         # A point spends 3 unknowns on its 2 measurements a frame.
         self.freedom = np.maximum(2.0 * seen.sum(axis=0) - 3.0, 1.0)
+        self._others = np.delete(np.arange(len(seen)), reference)
+        self._complete = bool(seen.all())
         self._shown = seen.astype(np.float64)
         self._granted = self.freedom * tolerance**2
         self._importance = np.sqrt(weight / self._granted)
@@ -230,7 +231,9 @@ class Bundle:
         xy = q[..., :2, :] / depth[..., None, :]
         square = xy[..., 0, :] * xy[..., 0, :] + xy[..., 1, :] * xy[..., 1, :]
         u = (_focal(e) * (1 + _k1(e) * square))[..., None, :] * xy
-        residual = np.where(self.seen[:, None], u - self.observed, 0.0)
+        residual = u - self.observed
+        if not self._complete:
+            residual = np.where(self.seen[:, None], residual, 0.0)
         return Projection(turned, depth, xy, square, u, residual, _square(residual))
 
     def residual(self, e: Estimate) -> Array:
@@ -360,7 +363,7 @@ class Bundle:
             V[axis, axis] += 1e-9 * trace + 1e-12
         own = Triangles(V[:, :, None, None]).halfway(own.swapaxes(0, 1))
         made_up = self._made_up(J[None], own[:, None])[0]
-        return Freed(self.reference, J, np.ascontiguousarray(made_up.transpose(2, 1, 0)))
+        return Freed(self._others, J, np.ascontiguousarray(made_up.transpose(2, 1, 0)))
 
     def _linearised(self, e: Estimate, p: Projection, weight: Array, translate: bool) -> tuple[Array, Array]:
         """Derivatives of the projections by camera (rotation, place) and lens, and the residuals
@@ -439,7 +442,7 @@ class Bundle:
 
     def _of_cameras(self, e: Estimate, J: Array) -> Array:
         """Normal equations (S, N + 1, N + 1) of cameras and lens alone, the gradient in the last column."""
-        U = _normal_equations(self.reference, J)
+        U = _normal_equations(self._others, J)
         lens = np.arange(-_GLOBALS - 1, -1)
         U[:, lens, lens] += 1 / self.lens_spread**2
         U[:, lens, -1] += (e.lens - self.lens_prior) / self.lens_spread**2
@@ -448,7 +451,7 @@ class Bundle:
     def _moved(self, e: Estimate, shared_step: Array, own_step: Array, translate: bool) -> Estimate:
         """The estimates after a step, their free scale fixed: root mean square of the camera's distances 1,
         rho >= 0."""
-        others = np.delete(np.arange(len(self.seen)), self.reference)
+        others = self._others
         cameras = shared_step[:, :-_GLOBALS].reshape(len(shared_step), -1, 6)
         R, t = e.R.copy(), e.t.copy()
         R[:, others] = rotation(cameras[..., :3]) @ e.R[:, others]
@@ -465,13 +468,13 @@ class Bundle:
         return Estimate(R, t, X, lens[:, 0], lens[:, 1])
 
 
-def _normal_equations(reference: int, J: Array) -> Array:
+def _normal_equations(others: NDArray[np.int64], J: Array) -> Array:
     """Those of cameras and lens (S, N + 1, N + 1), points where they are, the gradient in the last column;
     from derivatives and residuals (S, K, 9, 2, P)."""
     # A camera's unknowns touch its own measurements only: blocks (K, 9, 8) instead of one matrix.
     rows = J.reshape(*J.shape[:3], -1)
     blocks = rows @ rows[:, :, :-1].swapaxes(2, 3)
-    cameras = np.delete(blocks, reference, axis=1)
+    cameras = blocks[:, others]
     each, count = np.arange(cameras.shape[1]), 6 * cameras.shape[1]
     U = np.zeros((len(J), count + _GLOBALS + 1, count + _GLOBALS + 1))
     by_camera = U[:, :count, :count].reshape(len(J), len(each), 6, len(each), 6)

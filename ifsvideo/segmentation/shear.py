@@ -64,10 +64,12 @@ def between_edges(
         Indices of points, nearest first.
     """
     left = cdist(anchor[first], anchor[second])
-    chosen = np.empty((min(pairs, len(first), len(second)), 2), dtype=np.int64)
-    for edge in chosen:
+    rows: list[int] = []
+    columns: list[int] = []
+    for _ in range(min(pairs, len(first), len(second))):
         i, j = divmod(int(left.argmin()), len(second))
-        edge[:] = first[i], second[j]
+        rows.append(i)
+        columns.append(j)
         left[i] = np.inf
         left[:, j] = np.inf
-    return chosen
+    return np.stack([first[rows], second[columns]], axis=1)
