@@ -71,34 +71,48 @@ def sample_models(
     usable, (x, y) = window.usable, window.place
     radius = config.disk_radius * unit
     pools = [np.flatnonzero(usable & ~background), np.flatnonzero(usable & background)]
-    inliers: list[Bools] = []
-    controls: list[NDArray[np.float64]] = []
-    foreground: list[bool] = []
-    # A disk may hold fewer than three points or only collinear ones; give up after as many failures as
-    # models.
-    for _ in range(2 * config.models):
-        if len(inliers) == config.models or not len(pools[0]) + len(pools[1]):
-            break
+
+    def disk() -> _Disk | None:
         fg = bool(rng.random() < config.foreground_share)
         pool = pools[0] if (fg and len(pools[0])) or not len(pools[1]) else pools[1]
-        fg = pool is pools[0]
         centre = int(pool[rng.integers(len(pool))])
         support = np.flatnonzero(
             usable & ((x - x[centre]) ** 2 + (y - y[centre]) ** 2 < radius**2)
         )  # eq. 3.1
-        through = centre if config.through_centre else None
-        best = _best_triple(window, support, through, unit, config, rng)
-        if best is not None:
-            mask = np.zeros(tracks.points, dtype=bool)
-            mask[best[0]] = True
-            inliers.append(mask)
-            controls.append(window.place[:, best[1]].T)
-            foreground.append(fg)
+        if len(support) < 3:
+            return None
+        triples = _triples(len(support), config.ransac_iterations, rng)
+        if config.through_centre:
+            own = int(np.searchsorted(support, centre))
+            triples[~(triples == own).any(axis=1), 0] = own
+        return _Disk(pool is pools[0], support, triples)
+
+    # A disk may hold fewer than three points or only collinear ones; give up after as many failures as
+    # models.
+    found = [
+        AffineModels(np.zeros((0, tracks.points), dtype=bool), np.zeros((0, 3, 2)), np.zeros(0, dtype=bool))
+    ]
+    tries = 2 * config.models if usable.any() else 0
+    while tries and (missing := config.models - sum(map(len, found))):
+        drawn = [disk() for _ in range(min(missing, tries))]
+        tries -= len(drawn)
+        if disks := [one for one in drawn if one is not None]:
+            found.append(_best_triples(window, disks, unit, config))
     return AffineModels(
-        np.array(inliers, dtype=bool).reshape(len(inliers), tracks.points),
-        np.array(controls, dtype=np.float64).reshape(-1, 3, 2),
-        np.array(foreground, dtype=bool),
+        np.concatenate([models.inliers for models in found]),
+        np.concatenate([models.controls for models in found]),
+        np.concatenate([models.foreground for models in found]),
     )
+
+
+@dataclass(frozen=True)
+class _Disk:
+    """A disk's points (S,), whether its centre is foreground, and triples (T, 3) of the points, counted
+    within the disk."""
+
+    foreground: bool
+    support: NDArray[np.int64]
+    triples: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -130,56 +144,54 @@ class _Window:
         return cls(tracks.xy[base].T.copy(), tracks.visible[base], path, seen)
 
 
-def _best_triple(
-    window: _Window,
-    support: NDArray[np.int64],
-    through: int | None,
-    unit: float,
-    config: SegmenterConfig,
-    rng: np.random.Generator,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Inliers and control points of the triple that explains most of the support, None where none serves.
+def _best_triples(window: _Window, disks: list[_Disk], unit: float, config: SegmenterConfig) -> AffineModels:
+    """The model of each disk's triple that explains most of its points; none where all are too narrow.
 
-    ``through`` names a point that must be one of the three."""
-    if len(support) < 3:
-        return None
-    triples = _triples(len(support), config.ransac_iterations, rng)
-    if through is not None:
-        own = int(np.searchsorted(support, through))
-        triples[~(triples == own).any(axis=1), 0] = own
-    place = window.place[:, support]
-    corners = place[:, triples]  # (2, T, 3)
-    first = corners[..., 0]
-    (x1, x2), (y1, y2) = (corners[..., 1:] - first[..., None]).transpose(0, 2, 1)
-    twice_area = x1 * y2 - y1 * x2
-    wide = np.abs(twice_area) / 2 > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2
-    if not wide.all():
-        if not wide.any():
-            return None
-        triples, first, twice_area = triples[wide], first[:, wide], twice_area[wide]
-        x1, x2, y1, y2 = x1[wide], x2[wide], y1[wide], y2[wide]
+    What takes a few numbers of each disk is done for all D of them at once: ``points`` are those of one disk
+    after the other, (N,) in all.
+    """
+    points = np.concatenate([disk.support for disk in disks])
+    sizes = np.array([len(disk.support) for disk in disks])
+    disk_of, first = np.repeat(np.arange(len(disks)), sizes), np.cumsum(sizes) - sizes
+    triples = np.stack([disk.triples for disk in disks], axis=1)  # (T, D, 3)
+    corners = points[triples + first[:, None]]
     # eq. 3.2: A_{1->f} = [c_f; 1] [c_1; 1]^-1, so a point is transferred by its barycentric coordinates in
     # c_1.
-    x, y = place[:, None] - first[..., None]
-    barycentric = np.empty((len(triples), 3, len(support)))
-    area = twice_area[:, None]
-    barycentric[:, 1] = (x * y2[:, None] - y * x2[:, None]) / area
-    barycentric[:, 2] = (x1[:, None] * y - y1[:, None] * x) / area
+    c = window.place[:, corners]  # (2, T, D, 3)
+    (x1, x2), (y1, y2) = (np.moveaxis(c[k, ..., 1:] - c[k, ..., :1], 2, 0) for k in (0, 1))
+    twice_area = x1 * y2 - y1 * x2
+    wide = np.abs(twice_area) / 2 > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2
+    area = np.where(wide, twice_area, 1.0)[:, disk_of]  # (T, N), as all from here
+    x, y = window.place[:, None, points] - c[..., 0][..., disk_of]
+    barycentric = np.empty((len(triples), 3, len(points)))
+    barycentric[:, 1] = (x * y2[:, disk_of] - y * x2[:, disk_of]) / area
+    barycentric[:, 2] = (x1[:, disk_of] * y - y1[:, disk_of] * x) / area
     barycentric[:, 0] = 1 - barycentric[:, 1] - barycentric[:, 2]
-    path, seen = window.path[:, support], window.seen[:, support]
-    # (T, 2 (F - 1), P), NaN where a corner is unseen
-    error = path[:, triples].transpose(1, 0, 2) @ barycentric
-    error -= path
-    np.multiply(error, error, out=error)
-    frames = len(seen)
-    error[:, :frames] += error[:, frames:]
-    fits = error[:, :frames] < (config.inlier_error * unit) ** 2
-    counted = seen[:, triples].prod(axis=2).T @ seen
-    inlier = (fits.sum(axis=1) >= 0.5 * counted) & (counted > 0)
-    winner = int(np.argmax(inlier.sum(axis=1)))
-    chosen = np.array(inlier[winner])
-    chosen[triples[winner]] = True
-    return support[chosen], support[triples[winner]]
+    fits, counted = np.empty(area.shape, dtype=np.int64), np.full(area.shape, float(len(window.seen)))
+    complete = bool(window.seen.all())
+    for disk, start in zip(disks, first.tolist(), strict=True):
+        own = slice(start, start + len(disk.support))
+        path, seen = window.path[:, disk.support], window.seen[:, disk.support]
+        # (T, 2 (F - 1), S), NaN where a corner is unseen
+        error = path[:, disk.triples].transpose(1, 0, 2) @ barycentric[:, :, own]
+        error -= path
+        np.multiply(error, error, out=error)
+        error[:, : len(seen)] += error[:, len(seen) :]
+        (error[:, : len(seen)] < (config.inlier_error * unit) ** 2).sum(axis=1, out=fits[:, own])
+        if not complete:
+            counted[:, own] = seen[:, disk.triples].prod(axis=2).T @ seen
+    inlier = (fits >= 0.5 * counted) & (counted > 0)
+    explained = np.where(wide, np.add.reduceat(inlier.astype(np.int64), first, axis=1), -1)
+    winner, every = explained.argmax(axis=0), np.arange(len(disks))
+    held = inlier[winner[disk_of], np.arange(len(points))]
+    chosen = corners[winner, every]  # (D, 3)
+    inliers = np.zeros((len(disks), len(window.usable)), dtype=bool)
+    inliers[disk_of[held], points[held]] = True
+    inliers[every[:, None], chosen] = True
+    models = AffineModels(
+        inliers, window.place[:, chosen].transpose(1, 2, 0), np.array([disk.foreground for disk in disks])
+    )
+    return models.select(np.flatnonzero(wide.any(axis=0)))
 
 
 _ORDERS = np.array([[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[1, 0, 2], [0, 1, 2]]])
