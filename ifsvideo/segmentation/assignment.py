@@ -38,14 +38,18 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
         return np.empty((0, tracks.points))
     complete = bool(seen.all())
     mean, main = np.zeros((len(models), len(W))), np.zeros((2, len(models), len(W)))
-    for model, inlier in enumerate(models.inliers):
-        own = np.flatnonzero(inlier)
-        paths = W[:, own] if complete else along_mean_path(W[:, own], seen[:, own])
+    sizes = models.inliers.sum(axis=1)
+    for size in set(sizes.tolist()):  # what has one shape is one stack
+        same = np.flatnonzero(sizes == size)
+        own = np.nonzero(models.inliers[same])[1].reshape(-1, size)
+        paths = W[:, own].transpose(1, 0, 2)
+        if not complete:
+            paths = np.stack([along_mean_path(W[:, each], seen[:, each]) for each in own])
         if centred:
-            mean[model] = paths.sum(axis=1) / len(own)
-            paths = paths - mean[model, :, None]
-        axes = principal(paths, 2).T
-        main[: len(axes), model] = axes
+            mean[same] = paths.mean(axis=2)
+            paths = paths - mean[same, :, None]
+        axes = principal(paths, 2)
+        main[: axes.shape[2], same] = np.moveaxis(axes, 2, 0)
     u, v = main / np.maximum(np.sqrt((main * main).sum(axis=2, keepdims=True)), 1e-12)
     # With D = (W - mean) where seen, all sums over frames are products of matrices (M, 2F) (2F, P).
     if complete:

@@ -119,7 +119,7 @@ class Freed:
         The cameras but the reference.
     J : (K, 9, 2, P) float
         Derivatives by each camera and the lens, and the residuals.
-    made_up : (P, 3, N + 1) float
+    made_up : (N + 1, 3, P) float
         Coordinates of the derivatives by all N = 6 (K - 1) + 2 unknowns, and of the residuals.
     """
 
@@ -129,28 +129,29 @@ class Freed:
 
     def subset(self, points: NDArray[np.int64]) -> Freed:
         """The same of some points."""
-        return replace(self, J=self.J[..., points], made_up=self.made_up[points])
+        return replace(self, J=self.J[..., points], made_up=self.made_up[..., points])
 
     def information(self, weight: Array) -> tuple[Array, Array]:
         """What the points, of some weight (P,), tell of cameras and lens: matrix (N, N) and gradient (N,) of
         the normal equations."""
         root = np.sqrt(weight)
-        rows = (self.made_up * root[:, None, None]).reshape(-1, self.made_up.shape[2])
-        left = _normal_equations(self.others, self.J[None] * root)[0] - rows.T @ rows
+        rows = (self.made_up * root).reshape(len(self.made_up), -1)
+        left = _normal_equations(self.others, self.J[None] * root)[0] - rows @ rows.T
         return left[:-1, :-1], left[:-1, -1]
 
     def square(self, step: Array | None = None) -> Array:
         """Sum of squares (P,) of the residuals, after a step (N,) of cameras and lens."""
         if step is None:
-            residual, missed = self.J[:, -1], self.made_up[..., -1]
+            residual, missed = self.J[:, -1], self.made_up[-1]
         else:
             each = np.zeros((len(self.J), 1, 6 + _GLOBALS + 1))
             each[self.others, 0, :6] = step[:-_GLOBALS].reshape(-1, 6)
             each[:, 0, 6:-1] = step[-_GLOBALS:]
             each[..., -1] = 1.0
             residual = (each @ self.J.reshape(*self.J.shape[:2], -1)).reshape(len(self.J), 2, -1)
-            missed = self.made_up @ np.append(step, 1.0)
-        left = _square(residual) - (missed * missed).sum(axis=1)
+            along = np.append(step, 1.0) @ self.made_up.reshape(len(self.made_up), -1)
+            missed = along.reshape(3, -1)
+        left = _square(residual) - (missed * missed).sum(axis=0)
         return np.asarray(np.maximum(left, 0.0))
 
 
@@ -362,8 +363,7 @@ class Bundle:
         for axis in range(3):
             V[axis, axis] += 1e-9 * trace + 1e-12
         own = Triangles(V[:, :, None, None]).halfway(own.swapaxes(0, 1))
-        made_up = self._made_up(J[None], own[:, None])[0]
-        return Freed(self._others, J, np.ascontiguousarray(made_up.transpose(2, 1, 0)))
+        return Freed(self._others, J, self._made_up(J[None], own[:, None])[0])
 
     def _linearised(self, e: Estimate, p: Projection, weight: Array, translate: bool) -> tuple[Array, Array]:
         """Derivatives of the projections by camera (rotation, place) and lens, and the residuals

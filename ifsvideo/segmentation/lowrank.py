@@ -89,10 +89,11 @@ class Subspace:
             M, inner = self.directions, self.directions.T @ self.directions
             inner.flat[:: self.rank + 1] += 1e-6 * (np.trace(inner) + 1e-9)
             aside = np.eye(len(M)) - M @ np.linalg.solve(inner, M.T)
-            error = aside @ (W - self.mean[:, None])
+            error, measured = aside @ (W - self.mean[:, None]), np.float64(len(W))
         else:
             error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
-        free = np.maximum((seen.sum(axis=0) - self.rank) / 2, 0.5)
+            measured = seen.sum(axis=0)
+        free = np.maximum((measured - self.rank) / 2, 0.5)
         return np.asarray(np.sqrt(np.einsum("fp,fp->p", error, error) / free))
 
     def _coordinates(self, W: Array, seen: Array) -> Array:
@@ -107,15 +108,16 @@ class Subspace:
 
 
 def principal(X: Array, rank: int) -> Array:
-    """The first left singular vectors of X (R, C), times their singular values (R, rank).
+    """The first left singular vectors of X (..., R, C), times their singular values (..., R, rank).
 
     By way of the smaller of its two products with itself, in half the time; a direction that holds less than
     1e-8 of the spread is lost by it.
     """
-    if len(X) > X.shape[1]:
-        return np.asarray(X @ np.linalg.eigh(X.T @ X)[1][:, ::-1][:, :rank])
-    square, U = np.linalg.eigh(X @ X.T)
-    return np.asarray((U * np.sqrt(np.maximum(square, 0.0)))[:, ::-1][:, :rank])
+    other = X.swapaxes(-1, -2)
+    if X.shape[-2] > X.shape[-1]:
+        return np.asarray(X @ np.linalg.eigh(other @ X)[1][..., ::-1][..., :rank])
+    square, U = np.linalg.eigh(X @ other)
+    return np.asarray((U * np.sqrt(np.maximum(square, 0.0))[..., None, :])[..., ::-1][..., :rank])
 
 
 def along_mean_path(W: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.float64]:
