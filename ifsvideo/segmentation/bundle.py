@@ -117,9 +117,9 @@ class Freed:
     ----------
     others : (K - 1,) int
         The cameras but the reference.
-    J : (K, 9, 2, P) float
+    J : (..., K, 9, 2, P) float
         Derivatives by each camera and the lens, and the residuals.
-    made_up : (N + 1, 3, P) float
+    made_up : (..., N + 1, 3, P) float
         Coordinates of the derivatives by all N = 6 (K - 1) + 2 unknowns, and of the residuals.
     """
 
@@ -128,31 +128,46 @@ class Freed:
     made_up: Array
 
     def subset(self, points: NDArray[np.int64]) -> Freed:
-        """The same of some points."""
-        return replace(self, J=self.J[..., points], made_up=self.made_up[..., points])
+        """The same of some points (n,), or of several sets of as many (S, n)."""
+        first = points.ndim - 1
+        J, made_up = self.J[..., points], self.made_up[..., points]
+        return replace(
+            self,
+            J=np.moveaxis(J, range(3, 3 + first), range(first)),
+            made_up=np.moveaxis(made_up, range(2, 2 + first), range(first)),
+        )
 
     def information(self, weight: Array) -> tuple[Array, Array]:
-        """What the points, of some weight (P,), tell of cameras and lens: matrix (N, N) and gradient (N,) of
-        the normal equations."""
+        """What the points, of some weight (..., P), tell of cameras and lens: matrix (..., N, N) and gradient
+        (..., N) of the normal equations."""
         root = np.sqrt(weight)
-        rows = (self.made_up * root).reshape(len(self.made_up), -1)
-        left = _normal_equations(self.others, self.J[None] * root)[0] - rows @ rows.T
-        return left[:-1, :-1], left[:-1, -1]
+        rows = self.made_up * root[..., None, None, :]
+        rows = rows.reshape(*rows.shape[:-2], -1)
+        left = _normal_equations(self.others, self.J * root[..., None, None, None, :])
+        left -= rows @ rows.swapaxes(-1, -2)
+        return left[..., :-1, :-1], left[..., :-1, -1]
 
     def square(self, step: Array | None = None) -> Array:
-        """Sum of squares (P,) of the residuals, after a step (N,) of cameras and lens."""
+        """Sum of squares (..., P) of the residuals, after a step (..., N) of cameras and lens."""
         if step is None:
-            residual, missed = self.J[:, -1], self.made_up[-1]
+            residual, missed = self.J[..., -1, :, :], self.made_up[..., -1, :, :]
         else:
-            each = np.zeros((len(self.J), 1, 6 + _GLOBALS + 1))
-            each[self.others, 0, :6] = step[:-_GLOBALS].reshape(-1, 6)
-            each[:, 0, 6:-1] = step[-_GLOBALS:]
+            each = np.zeros((*self.J.shape[:-3], 6 + _GLOBALS + 1))
+            each[..., self.others, :6] = step[..., :-_GLOBALS].reshape(*step.shape[:-1], -1, 6)
+            each[..., 6:-1] = step[..., None, -_GLOBALS:]
             each[..., -1] = 1.0
-            residual = (each @ self.J.reshape(*self.J.shape[:2], -1)).reshape(len(self.J), 2, -1)
-            along = np.append(step, 1.0) @ self.made_up.reshape(len(self.made_up), -1)
-            missed = along.reshape(3, -1)
-        left = _square(residual) - (missed * missed).sum(axis=0)
+            residual = _along(each, self.J)
+            missed = _along(np.concatenate([step, np.ones((*step.shape[:-1], 1))], axis=-1), self.made_up)
+        left = _square(residual) - (missed * missed).sum(axis=-2)
         return np.asarray(np.maximum(left, 0.0))
+
+
+def _along(step: Array, derivatives: Array) -> Array:
+    """Sum (..., R, P) of derivatives (..., N, R, P), each times its part of a step (..., N)."""
+    shape = derivatives.shape
+    return np.asarray(
+        (step[..., None, :] @ derivatives.reshape(*shape[:-2], -1)).reshape(*shape[:-3], *shape[-2:])
+    )
 
 
 class Bundle:
@@ -469,20 +484,20 @@ class Bundle:
 
 
 def _normal_equations(others: NDArray[np.int64], J: Array) -> Array:
-    """Those of cameras and lens (S, N + 1, N + 1), points where they are, the gradient in the last column;
-    from derivatives and residuals (S, K, 9, 2, P)."""
+    """Those of cameras and lens (..., N + 1, N + 1), points where they are, the gradient in the last column;
+    from derivatives and residuals (..., K, 9, 2, P)."""
     # A camera's unknowns touch its own measurements only: blocks (K, 9, 8) instead of one matrix.
-    rows = J.reshape(*J.shape[:3], -1)
-    blocks = rows @ rows[:, :, :-1].swapaxes(2, 3)
-    cameras = blocks[:, others]
-    each, count = np.arange(cameras.shape[1]), 6 * cameras.shape[1]
-    U = np.zeros((len(J), count + _GLOBALS + 1, count + _GLOBALS + 1))
-    by_camera = U[:, :count, :count].reshape(len(J), len(each), 6, len(each), 6)
-    by_camera[:, each, :, each] = cameras[:, :, :6, :6].swapaxes(0, 1)
-    U[:, count:, :count] = cameras[:, :, 6:, :6].swapaxes(1, 2).reshape(len(J), -1, count)
-    U[:, :count, count:] = U[:, count:, :count].swapaxes(1, 2)
-    U[:, count:, count:-1] = blocks[:, :, 6:, 6:].sum(axis=1)
-    U[:, count:-1, -1] = U[:, -1, count:-1]
+    rows = J.reshape(*J.shape[:-2], -1)
+    blocks = rows @ rows[..., :-1, :].swapaxes(-1, -2)
+    cameras, stack = blocks[..., others, :, :], J.shape[:-4]
+    each, count = np.arange(len(others)), 6 * len(others)
+    U = np.zeros((*stack, count + _GLOBALS + 1, count + _GLOBALS + 1))
+    by_camera = U[..., :count, :count].reshape(*stack, len(each), 6, len(each), 6).swapaxes(-3, -2)
+    by_camera[..., each, each, :, :] = cameras[..., :6, :6]
+    U[..., count:, :count] = cameras[..., 6:, :6].swapaxes(-3, -2).reshape(*stack, -1, count)
+    U[..., :count, count:] = U[..., count:, :count].swapaxes(-1, -2)
+    U[..., count:, count:-1] = blocks[..., 6:, 6:].sum(axis=-3)
+    U[..., count:-1, -1] = U[..., -1, count:-1]
     return U
 
 

@@ -9,6 +9,8 @@ that lie where nothing holds the cameras bend them to their own motion. The trut
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,15 +49,27 @@ class Leeway:
         lens = np.arange(-2, 0)
         self._held[lens, lens] += 1 / world.bundle.lens_spread**2
 
-    def evidence(self, points: NDArray[np.int64]) -> float:
-        """Median distance of some points (n,) from static points' ways, in the units of `World.evidence`,
-        after the cameras gave way to them."""
-        freed, scale = self._freed.subset(points), self._scale[points]
+    def evidence(self, groups: Sequence[NDArray[np.int64]]) -> list[float]:
+        """Median distance of each group's points (n,) from static points' ways, in the units of
+        `World.evidence`, after the cameras gave way to them."""
+        if not groups:
+            return []
+        sizes = [len(points) for points in groups]
+        # As many of each, some more than once, which do not count.
+        padded = np.stack([np.resize(points, max(sizes)) for points in groups])
+        counts = np.arange(max(sizes)) < np.array(sizes)[:, None]
+        freed, scale = self._freed.subset(padded), self._scale[padded]
         square = freed.square() * scale
+        typical = np.array([max(median(own[:size]), 1e-12) for own, size in zip(square, sizes, strict=True)])
         # Most of them decide; what fits worse than those is weighed down.
-        weight = scale / (1 + square / max(median(square), 1e-12)) ** 2
+        weight = np.where(counts, scale, 0.0) / (1 + square / typical[:, None]) ** 2
         information, pull = freed.information(weight)
         held = self._held + information
-        held.flat[:: len(held) + 1] += _GAUGE * np.trace(held) / len(held)
-        after = freed.square(-np.asarray(np.linalg.solve(held, pull), np.float64)) * scale
-        return float(np.sqrt(median(after))) / self._threshold
+        unknowns = np.arange(len(self._held))
+        held[:, unknowns, unknowns] += _GAUGE * np.trace(held, axis1=1, axis2=2)[:, None] / len(unknowns)
+        step = -np.asarray(np.linalg.solve(held, pull[..., None]), np.float64)[..., 0]
+        after = freed.square(step) * scale
+        return [
+            float(np.sqrt(median(own[:size]))) / self._threshold
+            for own, size in zip(after, sizes, strict=True)
+        ]
