@@ -432,7 +432,7 @@ class Bundle:
         for axis in range(3):
             V[axis, axis] += (1e-3 * damping[:, None] + 1e-12) * trace
         points = Triangles(V[..., None, None, :])
-        rows = self._made_up(J, points.halfway(np.moveaxis(own, 2, 0))).reshape(len(J), -1, 3 * len(e.X[0]))
+        rows = self._made_up(J, points.halfway(own.transpose(2, 0, 1, 3, 4))).reshape(len(J), -1, 3 * len(e.X[0]))
         U = self._of_cameras(e, J)
         left = U - rows @ rows.transpose(0, 2, 1)
         unknowns = np.arange(len(U[0]) - 1)
@@ -478,8 +478,8 @@ class Bundle:
             t /= scale[:, None, None]
             X[..., 2] *= scale[:, None]
         X[..., 2] = np.maximum(X[..., 2], self.farthest)
-        lens = e.lens + shared_step[:, -_GLOBALS:]
-        lens = np.clip(lens, self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread)
+        least, most = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
+        lens = np.minimum(np.maximum(e.lens + shared_step[:, -_GLOBALS:], least), most)
         return Estimate(R, t, X, lens[:, 0], lens[:, 1])
 
 

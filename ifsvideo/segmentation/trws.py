@@ -345,7 +345,8 @@ class _Messages:
         labels, nodes = level.unary.shape
         lower, kind = level.lower, self.kinds[fixed]
         same = fixed * nodes + lower.owner
-        saved = np.bincount(same, lower.change, labels * nodes).astype(np.float64).reshape(labels, nodes)
+        saved = np.asarray(np.bincount(same, lower.change, labels * nodes), np.float64)
+        saved = saved.reshape(labels, nodes)
         of_kind = np.bincount(kind * nodes + lower.owner, lower.of_kind, 2 * nodes).reshape(2, nodes)
         saved[: self.split] += of_kind[0]
         saved[self.split :] += of_kind[1]
