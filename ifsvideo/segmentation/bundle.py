@@ -432,7 +432,8 @@ class Bundle:
         for axis in range(3):
             V[axis, axis] += (1e-3 * damping[:, None] + 1e-12) * trace
         points = Triangles(V[..., None, None, :])
-        rows = self._made_up(J, points.halfway(own.transpose(2, 0, 1, 3, 4))).reshape(len(J), -1, 3 * len(e.X[0]))
+        own = points.halfway(own.transpose(2, 0, 1, 3, 4))
+        rows = self._made_up(J, own).reshape(len(J), -1, 3 * len(e.X[0]))
         U = self._of_cameras(e, J)
         left = U - rows @ rows.transpose(0, 2, 1)
         unknowns = np.arange(len(U[0]) - 1)

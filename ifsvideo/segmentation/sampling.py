@@ -76,9 +76,9 @@ def sample_models(
         fg = bool(rng.random() < config.foreground_share)
         pool = pools[0] if (fg and len(pools[0])) or not len(pools[1]) else pools[1]
         centre = int(pool[rng.integers(len(pool))])
-        support = np.flatnonzero(
-            usable & ((x - x[centre]) ** 2 + (y - y[centre]) ** 2 < radius**2)
-        )  # eq. 3.1
+        # Not compared as squares: of tracks in whole pixels some lie on the edge.
+        distance = np.sqrt((x - x[centre]) ** 2 + (y - y[centre]) ** 2)
+        support = np.flatnonzero(usable & (distance < radius))  # eq. 3.1
         if len(support) < 3:
             return None
         triples = _triples(len(support), config.ransac_iterations, rng)
