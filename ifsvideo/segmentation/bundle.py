@@ -128,14 +128,11 @@ class Freed:
     made_up: Array
 
     def subset(self, points: NDArray[np.int64]) -> Freed:
-        """The same of some points (n,), or of several sets of as many (S, n)."""
-        first = points.ndim - 1
-        J, made_up = self.J[..., points], self.made_up[..., points]
-        return replace(
-            self,
-            J=np.moveaxis(J, range(3, 3 + first), range(first)),
-            made_up=np.moveaxis(made_up, range(2, 2 + first), range(first)),
+        """The same of several sets (S, n) of as many points each."""
+        J, made_up = (
+            np.stack([values.take(own, axis=-1) for own in points]) for values in (self.J, self.made_up)
         )
+        return Freed(self.others, J, made_up)
 
     def information(self, weight: Array) -> tuple[Array, Array]:
         """What the points, of some weight (..., P), tell of cameras and lens: matrix (..., N, N) and gradient

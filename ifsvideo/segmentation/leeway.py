@@ -43,9 +43,9 @@ class Leeway:
         self._scale = 1 / (grant**2 * world.bundle.freedom)
         self._threshold = threshold
         few = core[:: 1 + (len(core) - 1) // REFIT_POINTS]
-        sure, scale = self._freed.subset(few), self._scale[few]
+        sure, scale = self._freed.subset(few[None]), self._scale[few]
         square = sure.square() * scale
-        self._held = sure.information(scale / (1 + square / _DOUBTFUL**2) ** 2)[0]
+        self._held = sure.information(scale / (1 + square / _DOUBTFUL**2) ** 2)[0][0]
         lens = np.arange(-2, 0)
         self._held[lens, lens] += 1 / world.bundle.lens_spread**2
 
@@ -56,8 +56,9 @@ class Leeway:
             return []
         sizes = [len(points) for points in groups]
         # As many of each, some more than once, which do not count.
-        padded = np.stack([np.resize(points, max(sizes)) for points in groups])
-        counts = np.arange(max(sizes)) < np.array(sizes)[:, None]
+        place = np.arange(max(sizes))
+        padded = np.stack([points[place % len(points)] for points in groups])
+        counts = place < np.array(sizes)[:, None]
         freed, scale = self._freed.subset(padded), self._scale[padded]
         square = freed.square() * scale
         typical = np.array([max(median(own[:size]), 1e-12) for own, size in zip(square, sizes, strict=True)])
