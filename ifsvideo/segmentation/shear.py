@@ -72,4 +72,6 @@ def between_edges(
         columns.append(j)
         left[i] = np.inf
         left[:, j] = np.inf
-    return np.stack([first[rows], second[columns]], axis=1)
+    chosen = np.empty((len(rows), 2), dtype=np.int64)
+    chosen[:, 0], chosen[:, 1] = first[rows], second[columns]
+    return chosen

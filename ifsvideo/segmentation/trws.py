@@ -239,8 +239,8 @@ class _Messages:
     ``up`` (L, E) runs from an edge's lower node to its upper one, ``down`` the other way (Kolmogorov's M_st
     and M_ts). Inside, labels are ordered by attribute, so that each kind is a slice, and they come first, so
     that least costs are those of rows. Either way's edges are in the order of the ends where they begin: a
-    level's are written in a row. What a level's nodes are told in one pass, their sums (L, n) ``from_below``
-    or ``from_above``, still holds in the next.
+    level's are written in a row. What a level's nodes are told in one pass, along each edge (L, edges)
+    ``below`` or ``above``, and their sums (L, n) ``from_below`` or ``from_above``, still holds in the next.
     """
 
     def __init__(self, problem: _Problem) -> None:
@@ -264,6 +264,8 @@ class _Messages:
             gamma = 1.0 / np.maximum(busiest, 1)
             unary = np.ascontiguousarray(self.unary[:, nodes])
             self.schedule.append(_Level(nodes, unary, gamma, lower, upper))
+        self.above = [np.zeros((len(self.unary), len(level.upper.ends))) for level in self.schedule]
+        self.below = [np.zeros((len(self.unary), len(level.lower.ends))) for level in self.schedule]
         self.from_above = [np.zeros(level.unary.shape) for level in self.schedule]
         self.from_below = [np.zeros(level.unary.shape) for level in self.schedule]
 
@@ -302,9 +304,10 @@ class _Messages:
             lower, upper = level.lower, level.upper
             from_above = level.unary + self.from_above[number]
             labels[level.nodes] = (from_above - self._agreement(level, labels[lower.ends])).argmin(0)
-            self.from_below[number] = (lower.sums @ self.up.take(lower.other, axis=1).T).T
+            self.below[number] = self.up.take(lower.other, axis=1)
+            self.from_below[number] = (lower.sums @ self.below[number].T).T
             share = (level.gamma * (from_above + self.from_below[number])).take(upper.owner, axis=1)
-            share -= self.down.take(upper.other, axis=1)
+            share -= self.above[number]
             self._shorten(share, upper)
             self.up[:, upper.own] = share
         return self.order[labels]
@@ -318,11 +321,12 @@ class _Messages:
         bound = 0.0
         for number, level in reversed(list(enumerate(self.schedule))):
             lower, upper = level.lower, level.upper
-            self.from_above[number] = (upper.sums @ self.down.take(upper.other, axis=1).T).T
+            self.above[number] = self.down.take(upper.other, axis=1)
+            self.from_above[number] = (upper.sums @ self.above[number].T).T
             belief = level.unary + self.from_below[number] + self.from_above[number]
             least = belief.min(axis=0)
             share = (level.gamma * (belief - least)).take(lower.owner, axis=1)
-            share -= self.up.take(lower.other, axis=1)
+            share -= self.below[number]
             rest = self._shorten(share, lower)
             self.down[:, lower.own] = share
             bound += float(least.sum() + rest.sum())
