@@ -155,19 +155,10 @@ def _best_triples(window: _Window, disks: list[_Disk], unit: float, config: Segm
     disk_of, first = np.repeat(np.arange(len(disks)), sizes), np.cumsum(sizes) - sizes
     triples = np.stack([disk.triples for disk in disks], axis=1)  # (T, D, 3)
     corners = points[triples + first[:, None]]
-    # eq. 3.2: A_{1->f} = [c_f; 1] [c_1; 1]^-1, so a point is transferred by its barycentric coordinates in
-    # c_1.
-    c = window.place[:, corners]  # (2, T, D, 3)
-    (x1, x2), (y1, y2) = (np.moveaxis(c[k, ..., 1:] - c[k, ..., :1], 2, 0) for k in (0, 1))
-    twice_area = x1 * y2 - y1 * x2
-    wide = np.abs(twice_area) / 2 > _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2
-    area = np.where(wide, twice_area, 1.0)[:, disk_of]  # (T, N), as all from here
-    x, y = window.place[:, None, points] - c[..., 0][..., disk_of]
-    barycentric = np.empty((len(triples), 3, len(points)))
-    barycentric[:, 1] = (x * y2[:, disk_of] - y * x2[:, disk_of]) / area
-    barycentric[:, 2] = (x1[:, disk_of] * y - y1[:, disk_of] * x) / area
-    barycentric[:, 0] = 1 - barycentric[:, 1] - barycentric[:, 2]
-    fits, counted = np.empty(area.shape, dtype=np.int64), np.full(area.shape, float(len(window.seen)))
+    smallest = _SMALLEST_TRIANGLE * (config.disk_radius * unit) ** 2
+    barycentric, wide = _barycentric(window.place[:, corners], window.place[:, points], disk_of, smallest)
+    fits = np.empty((len(triples), len(points)), dtype=np.int64)
+    counted = np.full(fits.shape, float(len(window.seen)))
     complete = bool(window.seen.all())
     for disk, start in zip(disks, first.tolist(), strict=True):
         own = slice(start, start + len(disk.support))
@@ -192,6 +183,41 @@ def _best_triples(window: _Window, disks: list[_Disk], unit: float, config: Segm
         inliers, window.place[:, chosen].transpose(1, 2, 0), np.array([disk.foreground for disk in disks])
     )
     return models.select(np.flatnonzero(wide.any(axis=0)))
+
+
+def _barycentric(
+    c: NDArray[np.float64], place: NDArray[np.float64], disk_of: NDArray[np.int64], smallest: float
+) -> tuple[NDArray[np.float64], Bools]:
+    """Where points lie in the triangles of their disk.
+
+    eq. 3.2: A_{1->f} = [c_f; 1] [c_1; 1]^-1, so a point is transferred by its barycentric coordinates in c_1.
+
+    Parameters
+    ----------
+    c : (2, T, D, 3) float
+        Corners of the triangles in the base frame.
+    place : (2, N) float
+        Points there.
+    disk_of : (N,) int
+    smallest : float
+        Area up to which three corners are taken for collinear.
+
+    Returns
+    -------
+    barycentric : (T, 3, N) float
+    wide : (T, D) bool
+        Which triangles are large enough; of the others the coordinates mean nothing.
+    """
+    (x1, x2), (y1, y2) = (np.moveaxis(c[axis, ..., 1:] - c[axis, ..., :1], 2, 0) for axis in (0, 1))
+    twice_area = x1 * y2 - y1 * x2
+    wide = np.abs(twice_area) / 2 > smallest
+    area = np.where(wide, twice_area, 1.0)[:, disk_of]
+    x, y = place[:, None] - c[..., 0][..., disk_of]
+    found = np.empty((len(area), 3, len(disk_of)))
+    found[:, 1] = (x * y2[:, disk_of] - y * x2[:, disk_of]) / area
+    found[:, 2] = (x1[:, disk_of] * y - y1[:, disk_of] * x) / area
+    found[:, 0] = 1 - found[:, 1] - found[:, 2]
+    return found, wide
 
 
 _ORDERS = np.array([[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[1, 0, 2], [0, 1, 2]]])
