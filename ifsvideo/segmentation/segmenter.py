@@ -29,6 +29,29 @@ from ifsvideo.types import UNDECIDED, Segmentation, Tracks
 
 
 @dataclass(frozen=True)
+class _Prepared:
+    """What no chance decides, and is the same however often a window is segmented.
+
+    Attributes
+    ----------
+    tracks : Tracks
+        Without the lens's bend and their noise.
+    size : (width, height) of the picture, pixels
+    unit : float, pixels of the picture per pixel of a 640x480 one
+    base : int, frame in which disks lie
+    anchor : (P, 2) float, places in the base frame, the mean ones of points not seen there
+    graph : (E, 2) int, neighbours
+    """
+
+    tracks: Tracks
+    size: tuple[int, int]
+    unit: float
+    base: int
+    anchor: NDArray[np.float64]
+    graph: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
 class IFSSegmenter:
     """Segments the tracks of one window; a `ifsvideo.types.Segmenter`.
 
@@ -70,14 +93,14 @@ class IFSSegmenter:
         confidence = np.zeros(tracks.points)
         details: dict[str, Any] = {}
         if len(usable):
-            chosen, rng = tracks.select(usable), np.random.default_rng(self.seed)
-            part = voted(lambda: self._stages(chosen, motions, rng), self.config.votes if self.alone else 1)
+            rng, prepared = np.random.default_rng(self.seed), self._prepared(tracks.select(usable))
+            part = voted(lambda: self._stages(prepared, motions, rng), self.config.votes if self.alone else 1)
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence
             details = dict(part.details, usable=usable)
         return Segmentation(labels, background, segments, confidence, details)
 
-    def _stages(self, tracks: Tracks, motions: int | None, rng: np.random.Generator) -> Segmentation:
+    def _prepared(self, tracks: Tracks) -> _Prepared:
         config = self.config
         tracks, size = in_a_picture(tracks)
         if config.distortion:
@@ -87,13 +110,17 @@ class IFSSegmenter:
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
+        return _Prepared(tracks, size, unit, base, anchor, delaunay_edges(anchor))
+
+    def _stages(self, prepared: _Prepared, motions: int | None, rng: np.random.Generator) -> Segmentation:
+        config, tracks, size, unit = self.config, prepared.tracks, prepared.size, prepared.unit
+        anchor, base = prepared.anchor, prepared.base
 
         # 1. What agrees with a static world seen by a moving camera.
         support, evidence, world = self._split(tracks, size, unit, rng)
         background = support >= 0.5
         # 2. and 3. Affine motion models in small disks, those that are needed; every point to one of them.
         models = sample_models(tracks, background, base, unit, config, rng)
-        graph = delaunay_edges(anchor)
         if len(models):
             residual = residuals(tracks, models, config.centred)
             cost = data_term(residual, models, 1 - support, unit, config)
@@ -104,7 +131,7 @@ class IFSSegmenter:
             else:
                 start = assign(tracks, models, residual, base, config.nearest_models)
             # 4. Segments with clean borders, more of them than motions.
-            chosen, solution = refine(tracks, models, cost, start, graph, unit, config)
+            chosen, solution = refine(tracks, models, cost, start, prepared.graph, unit, config)
             fit = residual[chosen, np.arange(tracks.points)] / unit
             details = {"models": models, "start": start, "solution": solution}
         else:

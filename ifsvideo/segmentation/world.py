@@ -7,6 +7,7 @@ Fundamental matrices of frame pairs test less: they do not see a point that slid
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -285,10 +286,10 @@ def _set_off(bundle: Bundle, turned: Estimate, frames: NDArray[np.int64]) -> Est
     first."""
     time = (frames - frames[bundle.reference]) / max(frames[-1] - frames[0], 1)
     X = np.column_stack([turned.X[:, :2], np.full(len(turned.X), SLIGHT)])
-    found = [
-        bundle.solve(replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=X), SET_OFF)
-        for direction in STARTS
+    starts = [
+        replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=X) for direction in STARTS
     ]
+    found = bundle.solve_each(starts, SET_OFF)
     return min(found, key=lambda estimate: _typical(bundle, estimate))
 
 
@@ -308,13 +309,16 @@ def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estima
     near = X.copy()
     near[:, :2] = turned.X[:, :2]
     near[:, 2] = 0.03  # 30 times the camera's way: far enough for any first step
-    found: list[tuple[float, int, Estimate]] = []
-    for direction in STARTS:
-        t = 2 * time[:, None] * np.array(direction, dtype=float)
-        estimate = bundle.solve(replace(turned, t=t, X=near), FALLING)
-        found.append((bundle.cost(bundle.residual(estimate), 1.0), len(found), estimate))
-    finished = []
-    for _, k, estimate in sorted(found, key=lambda item: item[:2])[:FINALISTS]:
-        better = bundle.solve(estimate, [2.0] + [1.0] * (FINAL_STEPS - 1))
-        finished.append((bundle.cost(bundle.residual(better), 1.0), k, better))
-    return min(finished, key=lambda item: item[:2])[2], turned
+    starts = [
+        replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=near)
+        for direction in STARTS
+    ]
+    found = bundle.solve_each(starts, FALLING)
+    best = np.sort(np.argsort(_costs(bundle, found), kind="stable")[:FINALISTS])
+    finished = bundle.solve_each([found[k] for k in best], [2.0] + [1.0] * (FINAL_STEPS - 1))
+    return finished[int(np.argmin(_costs(bundle, finished)))], turned
+
+
+def _costs(bundle: Bundle, found: Sequence[Estimate]) -> Array:
+    """How badly each of some estimates fits."""
+    return np.array([bundle.cost(bundle.residual(estimate), 1.0) for estimate in found])
