@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -169,6 +170,12 @@ class Tracks:
     def points(self) -> int:
         """Number of points P."""
         return int(self.xy.shape[1])
+
+    @cached_property
+    def planes(self) -> NDArray[np.float64]:
+        """x and y (2, F, P): with the points last, what is done to many of them is one run through
+        memory."""
+        return np.ascontiguousarray(self.xy.transpose(2, 0, 1))
 
     @property
     def W(self) -> NDArray[np.float64]:

@@ -70,7 +70,7 @@ def test_truth_projects_onto_what_was_observed(aside: Scene) -> None:
 def test_derivatives_agree_with_differences(aside: Scene) -> None:
     bundle, h = bundle_of(aside), 1e-6
     e = replace(disturbed(true_estimate(aside)), k1=0.1)
-    by_shared, by_point = bundle._derivatives(e, bundle.project(e))
+    by_shared, by_point = bundle._linearised(e, bundle.project(e), bundle.seen.astype(float), True)
 
     def difference(plus: Estimate, minus: Estimate) -> np.ndarray:
         return np.asarray((bundle.project(plus).u - bundle.project(minus).u) / (2 * h))
@@ -95,7 +95,7 @@ def test_unseen_observations_have_no_say(aside: Scene) -> None:
     hidden = ~scene.tracks.visible
     assert hidden.any()
     assert not bundle.residual(e).transpose(0, 2, 1)[hidden].any()
-    for derivative in bundle._derivatives(e, bundle.project(e)):
+    for derivative in bundle._linearised(e, bundle.project(e), bundle.seen.astype(float), True):
         assert not derivative.transpose(0, 3, 1, 2)[hidden].any()
 
 
@@ -127,6 +127,18 @@ def test_a_step_never_raises_the_cost(aside: Scene, seed: int) -> None:
         costs.append(bundle.cost(bundle.residual(moved), 1.0))
     assert (np.diff(costs) <= 1e-9).all()
     assert costs[-1] < costs[0]
+
+
+def test_several_estimates_are_solved_as_each_by_itself(aside: Scene) -> None:
+    bundle, truth = bundle_of(aside), true_estimate(aside)
+    far_off = disturbed(truth, 1)
+    starts = [disturbed(truth), replace(far_off, X=far_off.X * [1, 1, 0.1], t=-far_off.t), truth]
+    # The truth is idle soon, and ends before the others.
+    together = bundle.solve_each(starts, [2.0] + [1.0] * 9)
+    for start, found in zip(starts, together, strict=True):
+        alone = bundle.solve(start, [2.0] + [1.0] * 9)
+        for name in ("R", "t", "X", "log_focal", "k1"):
+            assert_allclose(getattr(found, name), getattr(alone, name), atol=1e-9)
 
 
 def test_points_alone_are_found_with_known_cameras(aside: Scene) -> None:
@@ -162,7 +174,7 @@ def test_a_point_may_not_be_farther_than_told(aside: Scene) -> None:
     few = np.arange(3)
     assert_allclose(bundle.subset(few).farthest, held[:3])
     # Cameras that give way move such a point's picture, not its depth.
-    assert bundle.without_places(found, True).square(np.arange(5)).min() > (0.5 / SIDE) ** 2
+    assert bundle.without_places(found, True).subset(np.arange(5)[None]).square().min() > (0.5 / SIDE) ** 2
 
 
 def test_the_spread_of_nearness_is_in_units_of_the_cameras_way() -> None:
@@ -227,22 +239,23 @@ def test_what_is_left_without_places_is_the_misfit_after_points_found_their_best
     fitted = bundle.solve_points(start, 30)
     if not translate:
         fitted = replace(fitted, X=fitted.X * [1, 1, 0])
-    every, step = np.arange(60), np.zeros(6 * 5 + 2)
+    step = np.zeros(6 * 5 + 2)
     step[-2] = 1e-4
     freed = bundle.without_places(fitted, translate)
-    before, told = freed.square(every), freed.square(every, step)
-    after = bundle.without_places(replace(fitted, log_focal=fitted.log_focal + 1e-4), translate).square(every)
+    before, told = freed.square(), freed.square(step)
+    after = bundle.without_places(replace(fitted, log_focal=fitted.log_focal + 1e-4), translate).square()
     assert_allclose(told - before, after - before, atol=0.01 * np.abs(after - before).max())
     # Nothing of it can be made up for by a point's own place.
     a_little = np.array([1e-6, -1e-6, 1e-6 * translate])
     followed = bundle.without_places(replace(fitted, X=fitted.X + a_little), translate)
-    assert_allclose(followed.square(every), before, atol=1e-9)
+    assert_allclose(followed.square(), before, atol=1e-9)
 
 
 def test_what_points_tell_of_the_cameras_is_how_their_misfit_changes(aside: Scene) -> None:
     freed = bundle_of(aside).without_places(disturbed(true_estimate(aside)), True)
-    rng, some = np.random.default_rng(0), np.arange(7, 30)
-    weight, step = rng.uniform(size=len(some)), 1e-2 * rng.normal(size=6 * 5 + 2)
-    matrix, pull = freed.information(some, weight)
-    change = weight @ (freed.square(some, step) - freed.square(some))
-    assert 2 * pull @ step + step @ matrix @ step == pytest.approx(change)
+    some = freed.subset(np.array([np.arange(7, 30), np.arange(30, 53)]))
+    rng = np.random.default_rng(0)
+    weights, steps = rng.uniform(size=(2, 23)), 1e-2 * rng.normal(size=(2, 6 * 5 + 2))
+    changes = (weights * (some.square(steps) - some.square())).sum(axis=1)
+    for matrix, pull, step, change in zip(*some.information(weights), steps, changes, strict=True):
+        assert 2 * pull @ step + step @ matrix @ step == pytest.approx(change)

@@ -188,14 +188,46 @@ def test_tracks_seen_shortly_join_the_object_on_which_they_lie() -> None:
     assert (clip.corrected(labels=labels)[joined] == -1).all()
 
 
+def test_what_passes_close_by_is_followed_by_its_short_tracks() -> None:
+    """Windows decided of a corner of the square alone, and only for a time; all else on it is guessed to be
+    ground."""
+    clip = sliding_square()
+    ids, frame = clip.points.ids, clip.points.frame
+    corner = clip.on_object[:9]
+    rows = (~np.isin(ids, corner) | (frame < 12)) & ~np.isin(ids, clip.outside)
+    clip = only(clip, rows)
+    ids, frame = clip.points.ids, clip.points.frame
+    # A life is eight frames: then another track goes on in the same place.
+    brief = np.isin(ids, clip.on_object) & ~np.isin(ids, corner)
+    reborn = replace(clip.points, ids=np.where(brief, ids + 10_000 * (1 + (frame + ids) // 8), ids))
+    clip = replace(clip, points=reborn)
+    labels = np.where(np.isin(reborn.ids, corner), 1, 0).astype(np.int32)
+    corrected = clip.corrected(labels=labels, guessed=np.unique(reborn.ids[brief]))
+    assert (corrected[brief] == 1).mean() > 0.95
+    assert (corrected[brief & (frame > 20)] == 1).mean() > 0.95
+    assert not corrected[~brief & ~np.isin(reborn.ids, corner)].any()
+
+
 def test_a_track_that_has_ended_is_forgotten() -> None:
     check = FigureGround()
-    check._stays.update({(1, 1): -2, (2, 1): -2, (5, 1): -1})
-    check._joins.update({(3, 1): 2, (4, 1): 2})
+    check._votes.update({(1, 1): -1, (2, 1): -1, (3, 1): 2, (4, 1): 2})
     check.forget(np.array([1, 3, 9]))
-    labels = np.array([1, 1, -1, -1, 1])
-    corrected = check.corrected(np.array([1, 2, 3, 4, 5]), labels, np.ones(5, bool))
-    assert corrected.tolist() == [1, 0, -1, 1, 1]
+    corrected = check.corrected(np.array([1, 2, 3, 4]), np.array([1, 1, -1, -1]), np.ones(4, bool))
+    assert corrected.tolist() == [1, 0, -1, 1]
+
+
+@pytest.mark.parametrize(("fps", "needed"), [(None, 1), (30.0, 1), (10.0, 2)])
+@pytest.mark.parametrize("decided", [False, True])
+def test_a_track_leaves_by_so_many_looks(fps: float | None, needed: int, decided: bool) -> None:
+    """One of which a window has decided by one more, and so at a low rate."""
+    check = FigureGround(fps=fps)
+    points = FramePoints(np.array([7]), np.array([[50.0, 50.0]], np.float32))
+    picture = Picture(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    check.add(picture, points, np.array([1]), np.array([False]), np.array([not decided]))
+    for against in range(1, 4):
+        check._votes[7, 1] = -against
+        label = check.corrected(points.ids, np.array([1]), np.array([not decided]))
+        assert label[0] == (against < needed + decided)
 
 
 def test_no_points_are_no_error() -> None:

@@ -159,10 +159,11 @@ def test_a_short_lived_object_goes_to_the_background() -> None:
 
 @pytest.mark.parametrize(("sure", "counts"), [(0.99, False), (0.999, False), (0.99999, True)])
 def test_an_object_of_one_window_counts_if_that_is_very_sure(sure: float, counts: bool) -> None:
+    """If those beside it cannot tell."""
     clip = standing_crowd(frames=150)
 
     def label(ids: np.ndarray, window: int) -> np.ndarray:
-        return np.where((ids < 20) & (window == 3), 1, 0)
+        return np.where(ids < 20, 1 if window == 3 else -1, 0)
 
     labels = label_clip(clip, Told(label, sure=lambda window: sure), replace(CONFIG, least_seconds=0.1))
     assert bool((labels > 0).any()) == counts
@@ -243,6 +244,13 @@ def test_a_window_that_misses_what_those_on_either_side_saw_is_not_believed() ->
     assert changes([1, 1, 0, 1, 1]) == []
     assert changes([1, 0, -1, 1, 1]) != []
     assert len(changes([0, 1, 0, 1, 1])) == 1
+
+
+def test_nor_is_one_that_alone_saw_something_move() -> None:
+    """However sure it is; but of two in a row either may be right."""
+    assert changes([0, 0, 1, 0, 0]) == []
+    assert len(changes([0, 1, 1, 0, 0])) == 2
+    assert len(changes([1, 1, 0, 0, 0])) == 1
 
 
 def test_short_tracks_follow_their_neighbours() -> None:

@@ -32,8 +32,8 @@ def test_cameras_that_are_known_from_one_corner_give_way_to_the_rest_of_the_worl
     assert len(rest) >= 8
     world = world_of(scene, core)
     leeway = Leeway(world, core, THRESHOLD)
-    assert leeway.evidence(rest) < 0.7 * fixed(world, rest)
-    assert leeway.evidence(core) == pytest.approx(fixed(world, core), rel=0.3)
+    assert leeway.evidence([rest])[0] < 0.7 * fixed(world, rest)
+    assert leeway.evidence([core])[0] == pytest.approx(fixed(world, core), rel=0.3)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -44,8 +44,8 @@ def test_cars_do_not_bend_cameras_that_the_whole_world_holds(seed: int) -> None:
     leeway = Leeway(world, core, THRESHOLD)
     for car in (1, 2):
         points = np.flatnonzero(scene.truth == car)
-        assert leeway.evidence(points) > 1
-        assert leeway.evidence(points) > 0.25 * fixed(world, points)
+        assert leeway.evidence([points])[0] > 1
+        assert leeway.evidence([points])[0] > 0.25 * fixed(world, points)
 
 
 def test_one_point_far_off_does_not_decide() -> None:
@@ -53,4 +53,4 @@ def test_one_point_far_off_does_not_decide() -> None:
     core = np.flatnonzero(scene.truth == 0)
     world = world_of(scene, core)
     mixed = np.append(core[:12], np.flatnonzero(scene.truth == 1)[:1])
-    assert Leeway(world, core, THRESHOLD).evidence(mixed) < 0.5
+    assert Leeway(world, core, THRESHOLD).evidence([mixed])[0] < 0.5

@@ -27,6 +27,13 @@ def test_what_moves_before_and_after_moves_in_between() -> None:
     assert between.say_of(IDS, before, after)[0].tolist() == [1, 1, 2, 0]
 
 
+def test_what_stands_before_and_after_stands_in_between() -> None:
+    before, between, after = window([0, 0, -1, 0]), window([1, 2, 1, -1]), window([0, 1, -1, 0])
+    assert between.say_of(IDS, before, after)[0].tolist() == [0, 2, 1, -1]
+    guessed = window([0, 0, 0, 0], [False, True, True, True])
+    assert between.say_of(IDS, before, guessed)[0].tolist() == [1, 0, 1, -1]
+
+
 def test_neither_side_alone_nor_two_objects_nor_a_guess_is_enough() -> None:
     between, other = window([0, 0, 0, 0]), window([1, 2, 1, 1])
     one = window([1, 1, 1, 1], [True, True, False, True])

@@ -143,6 +143,15 @@ def test_what_fell_apart_in_a_single_window_grows_together_again() -> None:
     assert link(linker, {range(20): 1}) == {range(20): {1}}
 
 
+def test_movers_are_what_windows_could_decide_of() -> None:
+    linker = Linker(least_shared=3)
+    tracks = window(range(6))
+    linker.link(tracks, np.array([1, 1, 1, 1, 0, 0]), np.array([True, True, True, False, True, True]))
+    assert sorted(linker.movers()) == [0, 1, 2]
+    linker.forget(np.array([1]))
+    assert sorted(linker.movers()) == [0, 2]
+
+
 def test_what_follows_its_neighbours_is_no_evidence() -> None:
     """Tracks that a window could not decide of take the label of others, and do not pass their number on."""
     linker = Linker(3)

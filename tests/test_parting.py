@@ -21,9 +21,14 @@ def scene(own: int = 30, ground: int = 200, seed: int = 0):
     return xy, np.arange(len(xy)) < own
 
 
-def motions(xy: np.ndarray, own: np.ndarray) -> tuple[Motions, View]:
+def motions(
+    xy: np.ndarray, own: np.ndarray, ground: np.ndarray | None = None, guessed: np.ndarray | None = None
+) -> tuple[Motions, View]:
     view = View.around(np.array([[150, 100], [250, 200]], np.float32), 0.2, 10.0, SIZE)
-    return Motions(view, xy, own, ~own, 1.0), view
+    none = np.zeros(len(xy), bool)
+    return Motions(
+        view, xy, own, ~own if ground is None else ground, none if guessed is None else guessed, 1.0
+    ), view
 
 
 def test_both_motions_are_found_among_wrong_tracks() -> None:
@@ -59,6 +64,28 @@ def test_tracks_that_are_not_seen_there_do_not_count() -> None:
     assert with_ground == pytest.approx(np.broadcast_to((-1.0, 0.0), with_ground.shape), abs=1e-3)
 
 
+def test_guessed_tracks_that_go_along_with_the_object_do_not_tell_how_the_ground_moves() -> None:
+    """Half of an object's tracks are too short for a window to decide of, and were guessed to be ground."""
+    xy, on = scene(own=60)
+    own = on & (np.arange(len(xy)) % 2 == 0)
+    there = (xy + np.where(on[:, None], (5.0, 1.0), (-1.0, 0.0))).astype(np.float32)
+    beside = np.random.default_rng(2).random(len(xy)) < 0.5
+    for guessed, right in ((~own & (on | beside), True), (~own & beside & ~on, False)):
+        _, with_ground = motions(xy, own, ~own, guessed)[0].to(there)
+        off = np.abs(with_ground - (-1.0, 0.0)).max(axis=2)
+        assert bool((off < 0.1).all()) == right
+
+
+def test_where_most_guesses_go_along_the_object_is_the_ground() -> None:
+    """All that is near goes along: it counts, and nothing parts."""
+    xy, own = scene()
+    there = xy + np.float32([5.0, 1.0])
+    far = ~own & ((xy < [30, 20]) | (xy > [370, 280])).any(axis=1)
+    there[far] = xy[far]
+    flows = motions(xy, own, ~own, ~own & ~far)[0].to(there)
+    assert how_far_parted(*flows) < 0.1
+
+
 def test_too_few_tracks_tell_nothing() -> None:
     for own, ground, known in ((2, 200, False), (3, 200, True), (30, 7, False)):
         assert motions(*scene(own, ground))[0].known == known
@@ -75,8 +102,9 @@ def test_a_ground_that_is_far_off_tells_nothing() -> None:
     xy, own = scene()
     near = own | ((xy < [60, 40]) | (xy > [340, 260])).any(axis=1)
     view = View.around(np.array([[190, 140], [210, 160]], np.float32), 0.2, 10.0, SIZE)
-    assert not Motions(view, xy[near], own[near], ~own[near], 1.0).known
-    assert Motions(view, xy[near], own[near], ~own[near], 4.0).known
+    xy, own, none = xy[near], own[near], np.zeros(np.count_nonzero(near), bool)
+    assert not Motions(view, xy, own, ~own, none, 1.0).known
+    assert Motions(view, xy, own, ~own, none, 4.0).known
 
 
 def test_how_far_two_motions_part() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.sampling import AffineModels, sample_models
+from ifsvideo.segmentation.sampling import AffineModels, _triples, sample_models
 from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, affine_tracks, make_scene, some_maps
 
@@ -150,3 +150,13 @@ def test_lengths_follow_the_unit() -> None:
     small = sample_models(tracks, np.ones(200, bool), 0, 1.0, CONFIG, np.random.default_rng(0))
     scaled = sample_models(large, np.ones(200, bool), 0, 4.0, CONFIG, np.random.default_rng(0))
     assert np.array_equal(small.inliers, scaled.inliers)
+
+
+@pytest.mark.parametrize("points", [3, 4, 5])
+def test_every_triple_is_as_likely_as_every_other(points: int) -> None:
+    triples = _triples(points, 30_000, np.random.default_rng(0))
+    kinds, count = np.unique(triples, axis=0, return_counts=True)
+    assert all(len(set(kind)) == 3 for kind in kinds.tolist())
+    expected = points * (points - 1) * (points - 2)
+    assert len(kinds) == expected
+    assert np.abs(count * expected / 30_000 - 1).max() < 0.15

@@ -7,7 +7,7 @@ import pytest
 
 import ifsvideo
 from ifsvideo.segmentation.config import SegmenterConfig
-from ifsvideo.segmentation.segmenter import IFSSegmenter
+from ifsvideo.segmentation.segmenter import IFSSegmenter, _Prepared
 from ifsvideo.segmenting import TracksSegmenter, window_length
 from ifsvideo.types import Segmentation, Tracks
 from tests.scenes import LEFT_CAR, SIZE, Camera, Mover, Scene, make_scene, share_wrong
@@ -50,9 +50,9 @@ def test_one_window_is_voted_on_and_windows_of_a_drive_are_not(monkeypatch: pyte
     """Where every run doubts, and none is like another."""
     made: list[int] = []
 
-    def run(self: IFSSegmenter, tracks: Tracks, *_: object) -> Segmentation:
-        made.append(tracks.points)
-        labels = np.arange(tracks.points) % (1 + len(made))
+    def run(self: IFSSegmenter, prepared: _Prepared, *_: object) -> Segmentation:
+        made.append(prepared.tracks.points)
+        labels = np.arange(made[-1]) % (1 + len(made))
         sure, still = np.ones(len(labels)), labels == 0
         return Segmentation(labels, still, labels, sure, {"doubt": 0.5, "world": None})
 

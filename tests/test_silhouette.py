@@ -107,6 +107,27 @@ def test_a_view_ends_with_the_picture(corner) -> None:
     assert piece.shape == (view.rows, view.columns)
 
 
+def test_a_view_grows_where_a_silhouette_goes_on() -> None:
+    view = View.around(np.array([[50, 40], [149, 89]], np.float32), 0.0, 0.0, (WIDTH, HEIGHT))
+    figure = np.zeros((view.rows, view.columns), bool)
+    assert view.grown_beyond(figure, 0.1, 0.4, (WIDTH, HEIGHT)) == view
+    figure[5:, -1] = True
+    wider = view.grown_beyond(figure, 0.1, 0.4, (WIDTH, HEIGHT))
+    assert (wider.left, wider.top, wider.width, wider.height) == (50, 40, 140, 50)
+    figure[:] = True
+    all_round = view.grown_beyond(figure, 0.1, 0.4, (WIDTH, HEIGHT))
+    assert (all_round.left, all_round.top, all_round.width, all_round.height) == (10, 20, 180, 90)
+    to_the_end = view.grown_beyond(figure, 0.1, 4.0, (WIDTH, HEIGHT))
+    assert (to_the_end.left, to_the_end.top, to_the_end.width, to_the_end.height) == (0, 0, WIDTH, HEIGHT)
+
+
+def test_what_lies_in_a_view_or_not_far_beyond_it() -> None:
+    view = View.around(np.array([[50, 40], [149, 89]], np.float32), 0.0, 0.0, (WIDTH, HEIGHT))
+    xy = np.array([[50, 40], [149, 89], [150, 89], [100, 39], [149, 16], [149, 14]], np.float32)
+    assert view.contains(xy).tolist() == [True, True, False, False, False, False]
+    assert view.contains(xy, 0.5).tolist() == [True, True, True, True, True, False]
+
+
 def test_places_of_a_view_and_back() -> None:
     view = View.around(np.array([[50, 50], [150, 110]], np.float32), 0.1, 5.0, (WIDTH, HEIGHT))
     nodes = view.nodes(5, 4)

@@ -17,5 +17,5 @@ def test_triangles_solve_symmetric_systems(rows: int) -> None:
     solved = np.linalg.solve(V, right[..., None])[..., 0]
     triangles = Triangles(V.transpose(1, 2, 0))
     assert_allclose(triangles.solve(right.T).T, solved)
-    half = triangles.halfway(np.stack([right.T, 2 * right.T]))
-    assert_allclose((half**2).sum(axis=1), np.outer([1, 4], (right * solved).sum(axis=1)))
+    half = Triangles(V.transpose(1, 2, 0)[:, :, None]).halfway(np.stack([right.T, 2 * right.T], axis=1))
+    assert_allclose((half**2).sum(axis=0), np.outer([1, 4], (right * solved).sum(axis=1)))

@@ -57,6 +57,42 @@ def test_movers_do_not_fit_into_it(name: str) -> None:
         assert (evidence[scene.truth == car] > 1).mean() > 0.9
 
 
+def with_bonnet(scene: Scene, points: int = 60) -> Tracks:
+    """The same tracks with as many in a corner of the picture, fixed to the camera."""
+    rng = np.random.default_rng(3)
+    strip = rng.uniform([40, SIZE[1] - 20], [290, SIZE[1] - 2], (points, 2))
+    fixed = strip + rng.normal(0, 0.1, (scene.tracks.frames, points, 2))
+    return Tracks.from_array(np.concatenate([scene.tracks.xy, fixed], axis=1), size=SIZE)
+
+
+def test_what_is_fixed_to_the_camera_tells_nothing_of_the_world() -> None:
+    """Hills far off on poor pictures, and the bonnet, which fits a camera that stands far better."""
+    camera = Camera.path(frames=30, step=(0, 0, 0.3), turn=(0, 0.002, 0))
+    static, fits = 60, []
+    for seed in range(6):
+        tracks = with_bonnet(make_scene(camera, static=static, depth=(40.0, 400.0), noise=0.65, seed=seed))
+        evidence, world = static_evidence(tracks, SIZE, 5.0, np.random.default_rng(0))
+        assert np.array_equal(np.flatnonzero(world.bundle.weight == 0), np.arange(static, tracks.points))
+        fits.append((evidence[:static] < 1).mean())
+    assert np.mean(fits) > 0.75
+
+
+def test_too_few_points_beside_the_bonnet_are_asked_with_it() -> None:
+    """Fewer points move than a world needs: then all tell."""
+    scene = make_scene(FORWARD, static=7)
+    world = fit_world(with_bonnet(scene, 1), SIZE, np.random.default_rng(0))
+    assert (world.bundle.weight > 0).all()
+
+
+def test_before_a_standing_camera_what_rests_is_the_world() -> None:
+    """Though something moves in most of the picture."""
+    scene = make_scene(CAMERAS["standing"], (LEFT_CAR, RIGHT_CAR), static=60)
+    evidence = evidence_of(scene)
+    assert (evidence[scene.truth == 0] < 1).all()
+    world = fit_world(scene.tracks, SIZE, np.random.default_rng(0))
+    assert (world.bundle.weight > 0).all()
+
+
 @pytest.mark.parametrize("name", ["standing", "only turning"])
 @pytest.mark.parametrize("car", [LEFT_CAR, RIGHT_CAR], ids=["left", "right"])
 def test_one_car_before_a_camera_that_stays_is_no_parallax(name: str, car: Mover) -> None:

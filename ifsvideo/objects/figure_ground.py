@@ -37,17 +37,23 @@ _GROWTH, _MARGIN = 0.1, 10.0
 objects spread over what moves nearly alike."""
 _SMALLEST = 8
 """Least side of a view, pixels: in a smaller one there is no outline."""
-_SELDOM_S, _OFTEN_S = 0.134, 0.067
+_TOUCHED, _GROWN = 0.1, 0.4
+"""Share of a side of its view that a silhouette covers where the object goes on beyond it, and how much
+farther is looked then, share of the view."""
+_SELDOM_S, _OFTEN_S = 0.134, 0.034
 """Longest and shortest time between two looks at an object, seconds."""
 _LOST = 0.22
 """Share of an object's tracks that may have ended since the last look: so each track is asked some four times
 in its life."""
-_LEAST_VOTES = 2
-"""Looks by which a track must have lain beside its object more often than on it: one alone may be wrong."""
+_LEAVES, _SURE_LEAVES = 1, 2
+"""Looks by which a track must have lain beside its object more often than on it: one that is guessed to be
+the object's, and one of which a window has decided."""
+_SLOW = 20.0
+"""Frames a second below which it takes one look more: pictures that are a tenth of a second apart differ by
+more than two motions. Without this a fiftieth of what moves in KT3DMoSeg goes to the background."""
 _HELD = 0.7
 """Share of the tracks of which a window has decided that a silhouette must hold. One that holds fewer is that
-of a part, or of something else: what was taken for the ground moves with the object. At 10 frames a second
-it is the wrong one at times, and without this a tenth of what moves in KT3DMoSeg goes to the background."""
+of a part, or of something else: what was taken for the ground moves with the object."""
 _STANDS = 1.0
 """How far the ground's typical track goes at most over the longest of these times before a camera that
 stands, pixels."""
@@ -107,11 +113,21 @@ class _Look:
     tracks: NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class _Sight:
+    """A silhouette (rows, columns) in its view, and the frames that told it, with the tracks (N, 2) there."""
+
+    view: View
+    silhouette: Bools
+    others: list[tuple[Parted, NDArray[np.float32]]]
+
+
 class FigureGround:
     """Looks every few frames which tracks lie on an object's silhouette, and lets these looks vote.
 
-    Tracks that move with an object but lie beside it are background. Tracks of which no window could decide,
-    for they were seen too shortly, join the object on which they lie.
+    Tracks that move with an object but lie beside it are background. Tracks that are only guessed to be
+    background join the object on which they lie, and show from then on where it is: what passes close by goes
+    so fast that no track of it lasts long enough for a window to decide.
 
     Of the frames only the last few are kept, and of every track the votes.
 
@@ -139,13 +155,14 @@ class FigureGround:
         self.lags = parting.lags(rate, _LAGS_S)
         """Frames between two pictures that are compared."""
         self._seldom, self._often = _SELDOM_S * rate, _OFTEN_S * rate
+        self._patience = int(rate < _SLOW)
         self._recent: deque[_Seen] = deque(maxlen=2 * self.lags[-1] + 1)
         self._frames = 0
         self._looks: dict[int, _Look] = {}
-        self._stays: Counter[tuple[int, int]] = Counter()
-        self._joins: Counter[tuple[int, int]] = Counter()
-        """Of each track and object: looks in which it lay there, less those in which it did not; first of
-        those that have the object's label, then of the others."""
+        self._votes: Counter[tuple[int, int]] = Counter()
+        """Of each track and object: looks in which it lay there, less those in which it did not."""
+        self._decided: set[int] = set()
+        """Tracks that windows have decided to be an object's."""
 
     def add(self, picture: Picture, points: FramePoints, labels: Ints, ground: Bools, guessed: Bools) -> None:
         """Take the next frame; looks at the one in the middle of those that are kept.
@@ -159,8 +176,10 @@ class FigureGround:
         ground : (N,) bool
             Which tracks show how the ground moves.
         guessed : (N,) bool
-            Which were seen so shortly that they only follow their neighbours' labels.
+            Which labels are but guesses: of tracks seen so shortly that they only follow their neighbours,
+            or of which windows do not agree.
         """
+        self._decided.update(points.ids[(labels > BACKGROUND) & ~guessed].tolist())
         self._recent.append(_Seen(picture, points, labels, ground, guessed, self._scale))
         self._frames += 1
         if self._frames > self.lags[-1]:
@@ -183,31 +202,39 @@ class FigureGround:
         """
         result = labels.astype(np.int64)
         beside: dict[int, list[int]] = {}
-        for (track, number), vote in self._stays.items():
-            if vote <= -_LEAST_VOTES:
+        for (track, number), vote in self._votes.items():
+            needed = self._patience + (_SURE_LEAVES if track in self._decided else _LEAVES)
+            if vote <= -needed:
                 beside.setdefault(number, []).append(track)
         for number, tracks in beside.items():
             result[(labels == number) & np.isin(ids, tracks)] = BACKGROUND
-        joined = {track: number for (track, number), vote in self._joins.items() if vote > 0}
-        if joined:
-            free = np.flatnonzero(guessed & (labels <= BACKGROUND) & np.isin(ids, list(joined)))
-            result[free] = [joined[track] for track in ids[free].tolist()]
+        free = guessed & (labels <= BACKGROUND)
+        result[free] = self._joined(ids[free], labels[free])
         return result
+
+    def _joined(self, ids: NDArray[np.int64], labels: Ints) -> NDArray[np.int64]:
+        """Labels (N,) of tracks that are guessed to be background, those that lay on an object by it."""
+        number_of = {track: number for (track, number), vote in self._votes.items() if vote > 0}
+        known = zip(ids.tolist(), labels.tolist(), strict=True)
+        return np.array([number_of.get(track, label) for track, label in known], np.int64)
 
     def forget(self, gone: NDArray[np.int64]) -> None:
         """Drop what is known of some tracks (T,) that have ended; one that comes again is a new one."""
         ended = set(gone.tolist())
-        for votes in (self._stays, self._joins):
-            for key in [key for key in votes if key[0] in ended]:
-                del votes[key]
+        for key in [key for key in self._votes if key[0] in ended]:
+            del self._votes[key]
+        self._decided -= ended
 
     def _look(self, place: int) -> None:
         """Look at the objects in a frame that have not been looked at for long."""
         here = self._recent[place - self._frames]
+        free = here.guessed & (here.labels <= BACKGROUND)
+        labels = here.labels.astype(np.int64)
+        labels[free] = self._joined(here.points.ids[free], labels[free])
         looks, due = {}, []
-        for number in np.unique(here.labels[here.labels > BACKGROUND]).tolist():
+        for number in np.unique(labels[labels > BACKGROUND]).tolist():
             look = self._looks.get(number)
-            tracks = here.points.ids[here.labels == number]
+            tracks = here.points.ids[labels == number]
             if look is None or self._is_due(look, place, tracks):
                 look = _Look(place, tracks)
                 due.append(number)
@@ -216,7 +243,7 @@ class FigureGround:
         if not looks or (not due and looks.keys() == self._looks.keys()) or self._camera_stands(here):
             return
         for number in due:
-            self._look_at(here, number, place)
+            self._look_at(here, number, labels == number, place)
         self._looks = looks
 
     def _camera_stands(self, here: _Seen) -> bool:
@@ -242,30 +269,43 @@ class FigureGround:
         left = np.count_nonzero(np.isin(look.tracks, tracks, assume_unique=True))
         return bool(left < (1 - _LOST) * len(look.tracks))
 
-    def _look_at(self, here: _Seen, number: int, place: int) -> None:
-        """Find the silhouette of an object in a frame, and count the votes of the tracks round it."""
-        xy, own = here.xy, here.labels == number
-        view = View.around(xy[own], _GROWTH, _MARGIN, here.size)
-        motions = Motions(view, xy, own, here.ground, math.hypot(*here.size) / 800)
-        if not motions.known or min(view.width, view.height) < _SMALLEST:
+    def _look_at(self, here: _Seen, number: int, own: Bools, place: int) -> None:
+        """Find the silhouette of an object in a frame, where its own tracks (N,) are known, and count the
+        votes of the tracks round it."""
+        xy = here.xy
+        seen = self._find(here, own, place, View.around(xy[own], _GROWTH, _MARGIN, here.size))
+        if seen is None:
             return
-        sides = [self._parted(motions, here.points.ids, place, way) for way in (-1, 1)]
-        if not any(sides):
-            return
-        parted = [[one for one, _ in side] for side in sides]
-        silhouette = find_silhouette(view, here.grey, here.colours_of(view), parted)
-        rows = np.flatnonzero(view.contains(xy))
-        on = _lies_on(silhouette, view, xy[rows])
-        held = on[(own & ~here.guessed)[rows]]
+        wider = seen.view.grown_beyond(seen.silhouette, _TOUCHED, _GROWN, here.size)
+        if wider != seen.view:
+            seen = self._find(here, own, place, wider) or seen
+        rows = np.flatnonzero(seen.view.contains(xy))
+        on = _lies_on(seen.silhouette, seen.view, xy[rows])
+        labelled = here.labels == number
+        held = on[(labelled & ~here.guessed)[rows]]
         if np.count_nonzero(held) < _HELD * len(held):
             return
         tracks = here.points.ids[rows].tolist()
-        for k in np.flatnonzero(own[rows]).tolist():
-            self._stays[tracks[k], number] += 1 if on[k] else -1
+        for k in np.flatnonzero(labelled[rows]).tolist():
+            self._votes[tracks[k], number] += 1 if on[k] else -1
         free = np.flatnonzero((here.guessed & (here.labels <= BACKGROUND))[rows])
-        along = _go_along(rows[free], xy, view, [pair for side in sides for pair in side])
+        along = _go_along(rows[free], xy, seen.view, seen.others)
         for k, goes in zip(free.tolist(), (on[free] & along).tolist(), strict=True):
-            self._joins[tracks[k], number] += 1 if goes else -1
+            self._votes[tracks[k], number] += 1 if goes else -1
+
+    def _find(self, here: _Seen, own: Bools, place: int, view: View) -> _Sight | None:
+        """The silhouette of an object in a view; None where its motion or the ground's is not known, or they
+        have not parted."""
+        ground = here.ground & ~own
+        motions = Motions(view, here.xy, own, ground, here.guessed, math.hypot(*here.size) / 800)
+        if not motions.known or min(view.width, view.height) < _SMALLEST:
+            return None
+        sides = [self._parted(motions, here.points.ids, place, way) for way in (-1, 1)]
+        if not any(sides):
+            return None
+        parted = [[one for one, _ in side] for side in sides]
+        silhouette = find_silhouette(view, here.grey, here.colours_of(view), parted)
+        return _Sight(view, silhouette, [pair for side in sides for pair in side])
 
     def _parted(
         self, motions: Motions, ids: NDArray[np.int64], place: int, way: int

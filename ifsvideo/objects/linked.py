@@ -36,15 +36,17 @@ class LinkedWindow:
     ) -> tuple[NDArray[np.int64], Bools]:
         """Labels of points (N,) by their tracks (N,), and whether these are but guessed.
 
-        What moves in the windows before and after moves in between, too: an object stands for half a window
-        less often than a window takes it for the world, and all else for an object.
+        Windows overlap by half, so that those before and after see together what this one sees: where they
+        agree whether a track moves, they outvote it. An object stands for half a window less often than a
+        window takes it for the world, and all else for an object.
         """
         labels, decided = self._find(ids)
         if before is not None and after is not None:
             first, was_decided = before._find(ids)
             second, is_decided = after._find(ids)
-            goes_on = (first > BACKGROUND) & (first == second) & was_decided & is_decided
-            labels = np.where(goes_on & (labels <= BACKGROUND), first, labels)
+            agreed = (first == second) & (first != UNDECIDED) & was_decided & is_decided
+            outvoted = agreed & ((first > BACKGROUND) != (labels > BACKGROUND))
+            labels = np.where(outvoted, first, labels)
         return labels, ~decided
 
     def _find(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools]:

@@ -58,6 +58,10 @@ class Linker:
         given = self._given.get(track) or self._guessed.get(track)
         return min(given, key=lambda number: (-given[number], number)) if given else None
 
+    def movers(self) -> NDArray[np.int64]:
+        """Tracks (T,) that windows called moving and could decide of."""
+        return np.fromiter(self._given, np.int64, len(self._given))
+
     def windows_of(self, number: int) -> int:
         """Number of windows in which an object was found."""
         return self._windows[number]

@@ -25,6 +25,11 @@ _NEIGHBOURS = 6
 _REACH = 44.0
 """Farthest that the ground's nearest track may be from the typical node on the view's rim, pixels of a
 640x480 picture: farther off the ground may move otherwise."""
+_ROUND = 1.0
+"""How far beyond a view, on every side, guessed tracks of the ground are asked whether they go along with
+the object, share of its size."""
+_MOST = 0.5
+"""Share of these that must not go along; where most do, what was taken for the object is the ground."""
 _FEW = 6
 """Fewest tracks to which more than one common step is fitted."""
 _FITS = 3
@@ -47,11 +52,15 @@ class Motions:
         Tracks in the frame that is looked at, pixels.
     own, ground : (N,) bool
         Which are the object's, and which the ground's.
+    guessed : (N,) bool
+        Which of the ground's are only guessed to be: they do not count where they go along with the object.
     unit : float
         Pixels per pixel of a 640x480 picture.
     """
 
-    def __init__(self, view: View, xy: NDArray[np.float32], own: Bools, ground: Bools, unit: float) -> None:
+    def __init__(
+        self, view: View, xy: NDArray[np.float32], own: Bools, ground: Bools, guessed: Bools, unit: float
+    ) -> None:
         self._xy = xy
         self._nodes = view.nodes(NODES, NODES)
         self._own, self._ground = np.flatnonzero(own), np.flatnonzero(ground)
@@ -66,6 +75,17 @@ class Motions:
             rim = np.ones((NODES, NODES), bool)
             rim[1:-1, 1:-1] = False
             self.known = bool(np.median(np.asarray(distance)[rim.ravel(), 0]) <= _REACH * unit)
+            self._asked, self._sure_near = self._guesses(view, guessed[self._ground])
+
+    def _guesses(self, view: View, guessed: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Those of the ground's tracks (K,) that are guessed and near the view, and the surely known (K, 6)
+        near each; none where these are too few."""
+        xy = self._xy[self._ground]
+        asked, sure = np.flatnonzero(guessed & view.contains(xy, _ROUND)), np.flatnonzero(~guessed)
+        if not len(asked) or len(sure) < _NEIGHBOURS:
+            return asked[:0], sure[:0, None]
+        tree = cKDTree(xy[sure], compact_nodes=False, balanced_tree=False)
+        return asked, sure[np.asarray(tree.query(xy[asked], k=_NEIGHBOURS)[1])]
 
     def to(self, there: NDArray[np.float32]) -> tuple[Flow, Flow] | None:
         """Flows of object and ground to the frame in which the tracks are at ``there`` (N, 2), NaN where one
@@ -75,7 +95,14 @@ class Motions:
         seen, seen_ground = np.isfinite(own[:, 0]), np.isfinite(ground[:, 0])
         if np.count_nonzero(seen) < _LEAST_POINTS or np.count_nonzero(seen_ground) < _LEAST_GROUND:
             return None
-        with_object = _affine(self._xy[self._own[seen]], own[seen], self._nodes)
+        asked = self._xy[self._ground[self._asked]]
+        flow = _affine(self._xy[self._own[seen]], own[seen], np.concatenate([self._nodes, asked]))
+        with_object, as_object = np.split(flow, [len(self._nodes)])
+        if len(asked):
+            guess, as_ground = ground[self._asked], _median(ground[self._sure_near], _NEIGHBOURS)
+            along = lengths(guess - as_object) < lengths(guess - as_ground)
+            if np.count_nonzero(along) < _MOST * len(along):
+                ground[self._asked[along]] = np.nan
         with_ground = _median(ground[self._near], _NEIGHBOURS)
         none_near = np.isnan(with_ground[:, 0])
         if none_near.any():

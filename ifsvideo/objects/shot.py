@@ -56,7 +56,8 @@ class Frame:
     labels : (N,) int
         Final once the frame comes out of a `Shot`.
     guessed : (N,) bool
-        Whether the window that labels the frame could not decide of the point's track: it is too short.
+        Whether the label is but a guess: the window that labels the frame could not decide of the point's
+        track, for it is too short, or it calls it background and another window does not.
     """
 
     place: int
@@ -199,8 +200,11 @@ class Shot:
         start = self._blocks[-1] if self._blocks else self._gone
         self._blocks.append(stop)
         block = self._frames[start - self._gone : stop - self._gone]
+        movers = self._linker.movers()
         for frame in block:
-            frame.labels, frame.guessed = window.say_of(frame.points.ids, self._before, after)
+            ids = frame.points.ids
+            frame.labels, frame.guessed = window.say_of(ids, self._before, after)
+            frame.guessed |= (frame.labels == BACKGROUND) & np.isin(ids, movers)
         self._before = window
         if not self._config.check_borders:
             return

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -61,11 +62,27 @@ class View:
         as the picture of ``size`` (width, height) goes."""
         low, high = xy.min(axis=0), xy.max(axis=0)
         grown = growth * (high - low) + margin
-        left, top = np.clip(np.floor(low - grown), 0, np.array(size) - 1).astype(int).tolist()
-        right, bottom = np.clip(np.ceil(high + grown), 0, np.array(size) - 1).astype(int).tolist()
+        return cls._of(low - grown, high + grown, size)
+
+    @classmethod
+    def _of(
+        cls, low: NDArray[np.floating[Any]], high: NDArray[np.floating[Any]], size: tuple[int, int]
+    ) -> View:
+        """The box from one corner (2,) to the other, as far as the picture goes."""
+        left, top = np.clip(np.floor(low), 0, np.array(size) - 1).astype(int).tolist()
+        right, bottom = np.clip(np.ceil(high), 0, np.array(size) - 1).astype(int).tolist()
         width, height = right + 1 - left, bottom + 1 - top
         scale = min(1.0, (_PIXELS / (width * height)) ** 0.5)
         return cls(left, top, width, height, max(1, round(width * scale)), max(1, round(height * scale)))
+
+    def grown_beyond(self, silhouette: Bools, share: float, growth: float, size: tuple[int, int]) -> View:
+        """The view, larger by ``growth`` times its size on the sides of which a silhouette (rows, columns) in
+        it covers more than a ``share``: there the object may go on."""
+        edges = (silhouette[:, 0], silhouette[0], silhouette[:, -1], silhouette[-1])
+        left, top, right, bottom = (growth * bool(edge.mean() > share) for edge in edges)
+        low, extent = np.array([self.left, self.top], float), np.array([self.width, self.height])
+        high = low + extent - 1
+        return View._of(low - extent * [left, top], high + extent * [right, bottom], size)
 
     def nodes(self, columns: int, rows: int) -> NDArray[np.float32]:
         """Places (rows * columns, 2) in the picture, spaced as the pixels of a view of this size."""
@@ -73,10 +90,12 @@ class View:
         y = self.top + (np.arange(rows) + 0.5) * self.height / rows - 0.5
         return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2).astype(np.float32)
 
-    def contains(self, xy: NDArray[np.float32]) -> Bools:
-        """Whether points (N, 2) of the picture lie in the box."""
-        x, y = (np.rint(xy) - [self.left, self.top]).T
-        return np.asarray((x >= 0) & (y >= 0) & (x < self.width) & (y < self.height), bool)
+    def contains(self, xy: NDArray[np.float32], beyond: float = 0.0) -> Bools:
+        """Whether points (N, 2) of the picture lie in the box, or no farther ``beyond`` it on any side than
+        so many times its size."""
+        extent = np.array([self.width, self.height])
+        place = np.rint(xy) - [self.left, self.top]
+        return np.asarray(((place >= -beyond * extent) & (place < (1 + beyond) * extent)).all(axis=1), bool)
 
     def places(self, xy: NDArray[np.float32], columns: int, rows: int) -> NDArray[np.float32]:
         """Points (N, 2) of the picture in pixels of a view of this size."""

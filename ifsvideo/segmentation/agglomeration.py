@@ -128,9 +128,9 @@ class Agglomeration:
 
 def _alike(numbers: Sequence[int], apart: Apart, most: float) -> list[list[int]]:
     """Sets of two and more groups, of which each pair is two motions with at most this probability."""
-    if len(numbers) < 2:
-        return []
     costs = [apart[pair] for pair in combinations(numbers, 2)]
+    if min(costs, default=np.inf) > most:
+        return []
     part = fcluster(linkage(costs, "complete"), most, "distance")
     sets = [[number for number, own in zip(numbers, part, strict=True) if own == p] for p in np.unique(part)]
     return [members for members in sets if len(members) > 1]

@@ -34,11 +34,26 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
     offset = np.nanmean(tracks.xy, axis=(0, 1)) if centred else np.zeros(2)
     W = np.nan_to_num((tracks.xy - offset).transpose(0, 2, 1).reshape(2 * tracks.frames, tracks.points))
     frames = tracks.visible.sum(axis=0)
-    spaces = [_subspace(W[:, inlier], seen[:, inlier], centred) for inlier in models.inliers]
-    if not spaces:
+    if not len(models):
         return np.empty((0, tracks.points))
-    mean, u, v = (np.stack([space[k] for space in spaces]) for k in range(3))  # (M, 2F) each
+    complete = bool(seen.all())
+    mean, main = np.zeros((len(models), len(W))), np.zeros((2, len(models), len(W)))
+    sizes = models.inliers.sum(axis=1)
+    for size in set(sizes.tolist()):  # what has one shape is one stack
+        same = np.flatnonzero(sizes == size)
+        own = np.nonzero(models.inliers[same])[1].reshape(-1, size)
+        paths = W[:, own].transpose(1, 0, 2)
+        if not complete:
+            paths = np.stack([along_mean_path(W[:, each], seen[:, each]) for each in own])
+        if centred:
+            mean[same] = paths.mean(axis=2)
+            paths = paths - mean[same, :, None]
+        axes = principal(paths, 2)
+        main[: axes.shape[2], same] = np.moveaxis(axes, 2, 0)
+    u, v = main / np.maximum(np.sqrt((main * main).sum(axis=2, keepdims=True)), 1e-12)
     # With D = (W - mean) where seen, all sums over frames are products of matrices (M, 2F) (2F, P).
+    if complete:
+        seen = seen[:, :1]  # one point stands for all
     square = (W**2).sum(axis=0) - 2 * mean @ W + mean**2 @ seen
     du, dv = (axis @ W - (axis * mean) @ seen for axis in (u, v))
     uu, uv, vv = ((one * other) @ seen for one, other in ((u, u), (u, v), (v, v)))
@@ -50,17 +65,6 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
     result = np.sqrt(np.maximum(square, 0.0) / np.maximum(frames, 1))
     result[:, frames < 2] = np.inf
     return np.asarray(result)
-
-
-def _subspace(
-    W: NDArray[np.float64], seen: NDArray[np.float64], centred: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Mean trajectory and two left singular vectors, (2F,) each; missing entries filled along the mean."""
-    W = along_mean_path(W, seen)
-    mean = W.mean(axis=1) if centred else np.zeros(len(W))
-    main = principal(W - mean[:, None], 2)
-    u, v = (main / np.maximum(np.linalg.norm(main, axis=0), 1e-12)).T
-    return mean, u, v
 
 
 def assign(

@@ -11,8 +11,10 @@ Picture coordinates here are normalised: origin in the centre, unit the longer s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +23,14 @@ from ifsvideo.segmentation.triangles import Triangles
 from ifsvideo.types import Bools
 
 Array = NDArray[np.float64]
+_Stack = TypeVar("_Stack", "Estimate", "Projection")
 
 _NEAREST = 0.05
 """Least depth q_z relative to that in the reference frame; keeps a diverging step finite."""
 _IDLE = 1e-3
 """Share of the cost by which a step must change it: after two in a row that do not, it is done."""
+_SETTLED = 1e-9
+"""Share of a point's squared error by which a step must change it: else the point has found its place."""
 _GLOBALS = 2
 """Shared unknowns: logarithm of the focal length, radial distortion."""
 
@@ -41,39 +46,64 @@ def skew(v: Array) -> Array:
 
 def rotation(omega: Array) -> Array:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), Rodrigues' formula."""
-    angle = np.maximum(np.linalg.norm(omega, axis=-1), 1e-12)[..., None, None]
-    cross = skew(omega)
-    return np.asarray(
-        np.eye(3) + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * (cross @ cross)
-    )
+    angle = np.maximum(np.sqrt((omega * omega).sum(axis=-1)), 1e-12)[..., None, None]
+    across = omega[..., :, None] * omega[..., None, :] * ((1 - np.cos(angle)) / angle**2)
+    return np.asarray(np.cos(angle) * np.eye(3) + np.sin(angle) / angle * skew(omega) + across)
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Cameras R (K, 3, 3), t (K, 3); points X (P, 3) as (a, b, rho); log_focal, k1 of all cameras."""
+    """Cameras R (K, 3, 3), t (K, 3); points X (P, 3) as (a, b, rho); log_focal, k1 of all cameras.
+
+    Several may be stacked: each array has one axis more then, the first, and log_focal and k1 are arrays.
+    """
 
     R: Array
     t: Array
     X: Array
-    log_focal: float
-    k1: float
+    log_focal: float | Array
+    k1: float | Array
 
     @property
     def lens(self) -> Array:
-        """The shared unknowns as a vector."""
-        return np.array([self.log_focal, self.k1])
+        """The shared unknowns as a vector (..., 2)."""
+        return np.stack([self.log_focal, self.k1], axis=-1)
+
+    @classmethod
+    def stacked(cls, estimates: Sequence[Estimate]) -> Estimate:
+        """Several as one."""
+        return cls(*(np.stack(values) for values in zip(*map(_values, estimates), strict=True)))
+
+    def each(self) -> list[Estimate]:
+        """The estimates of a stack."""
+        return [Estimate(*values) for values in zip(*_values(self), strict=True)]
 
 
 @dataclass(frozen=True)
 class Projection:
-    """Intermediate values of a projection, kept for its derivatives: R (a, b, 1) (K, 3, P), depth (K, P),
-    xy and u (K, 2, P), the square of xy (K, P)."""
+    """A projection, and the intermediate values that its derivatives need.
+
+    Attributes
+    ----------
+    turned : (..., K, 3, P) float
+        R (a, b, 1).
+    depth : (..., K, P) float
+    xy, u : (..., K, 2, P) float
+    square : (..., K, P) float
+        |xy|^2.
+    residual : (..., K, 2, P) float
+        u minus the observation, zero where unseen.
+    error : (..., P) float
+        Sum of squares of each point's residuals.
+    """
 
     turned: Array
     depth: Array
     xy: Array
     square: Array
     u: Array
+    residual: Array
+    error: Array
 
 
 @dataclass(frozen=True)
@@ -85,45 +115,56 @@ class Freed:
 
     Attributes
     ----------
-    free : (C,) int
+    others : (K - 1,) int
         The cameras but the reference.
-    J : (K, 8, 2, P) float
-        Derivatives by each camera and the lens.
-    residual : (K, 2, P) float
-    made_up : (P, 3, N) float
-        Coordinates of the derivatives by all N = 6 C + 2 unknowns.
-    missed : (P, 3) float
-        Coordinates of the residuals.
+    J : (..., K, 9, 2, P) float
+        Derivatives by each camera and the lens, and the residuals.
+    made_up : (..., N + 1, 3, P) float
+        Coordinates of the derivatives by all N = 6 (K - 1) + 2 unknowns, and of the residuals.
     """
 
-    free: NDArray[np.int64]
+    others: NDArray[np.int64]
     J: Array
-    residual: Array
     made_up: Array
-    missed: Array
 
-    def information(self, points: NDArray[np.int64], weight: Array) -> tuple[Array, Array]:
-        """What points (n,) of some weight (n,) tell of cameras and lens: matrix (N, N) and gradient (N,) of
-        the normal equations."""
-        matrix, gradient = _normal_equations(
-            self.free, self.J[..., points], self.residual[..., points], weight
+    def subset(self, points: NDArray[np.int64]) -> Freed:
+        """The same of several sets (S, n) of as many points each."""
+        J, made_up = (
+            np.stack([values.take(own, axis=-1) for own in points]) for values in (self.J, self.made_up)
         )
-        root = np.sqrt(weight)[:, None]
-        rows = (self.made_up[points] * root[..., None]).reshape(-1, len(matrix))
-        return matrix - rows.T @ rows, gradient - rows.T @ (self.missed[points] * root).ravel()
+        return Freed(self.others, J, made_up)
 
-    def square(self, points: NDArray[np.int64], step: Array | None = None) -> Array:
-        """Sum of squares (n,) of the residuals of points (n,), after a step (N,) of cameras and lens."""
-        residual, missed = self.residual[..., points], self.missed[points]
-        if step is not None:
-            each = np.zeros((len(self.J), 1, 6 + _GLOBALS))
-            each[self.free, 0, :6] = step[:-_GLOBALS].reshape(-1, 6)
-            each[:, 0, 6:] = step[-_GLOBALS:]
-            J = self.J[..., points]
-            residual = residual + (each @ J.reshape(*J.shape[:2], -1)).reshape(residual.shape)
-            missed = missed + self.made_up[points] @ step
-        left = _square(residual) - np.einsum("pa,pa->p", missed, missed)
+    def information(self, weight: Array) -> tuple[Array, Array]:
+        """What the points, of some weight (..., P), tell of cameras and lens: matrix (..., N, N) and gradient
+        (..., N) of the normal equations."""
+        root = np.sqrt(weight)
+        rows = self.made_up * root[..., None, None, :]
+        rows = rows.reshape(*rows.shape[:-2], -1)
+        left = _normal_equations(self.others, self.J * root[..., None, None, None, :])
+        left -= rows @ rows.swapaxes(-1, -2)
+        return left[..., :-1, :-1], left[..., :-1, -1]
+
+    def square(self, step: Array | None = None) -> Array:
+        """Sum of squares (..., P) of the residuals, after a step (..., N) of cameras and lens."""
+        if step is None:
+            residual, missed = self.J[..., -1, :, :], self.made_up[..., -1, :, :]
+        else:
+            each = np.zeros((*self.J.shape[:-3], 6 + _GLOBALS + 1))
+            each[..., self.others, :6] = step[..., :-_GLOBALS].reshape(*step.shape[:-1], -1, 6)
+            each[..., 6:-1] = step[..., None, -_GLOBALS:]
+            each[..., -1] = 1.0
+            residual = _along(each, self.J)
+            missed = _along(np.concatenate([step, np.ones((*step.shape[:-1], 1))], axis=-1), self.made_up)
+        left = _square(residual) - (missed * missed).sum(axis=-2)
         return np.asarray(np.maximum(left, 0.0))
+
+
+def _along(step: Array, derivatives: Array) -> Array:
+    """Sum (..., R, P) of derivatives (..., N, R, P), each times its part of a step (..., N)."""
+    shape = derivatives.shape
+    return np.asarray(
+        (step[..., None, :] @ derivatives.reshape(*shape[:-2], -1)).reshape(*shape[:-3], *shape[-2:])
+    )
 
 
 class Bundle:
@@ -168,7 +209,11 @@ class Bundle:
         self.lens_spread = lens_spread
         # A point spends 3 unknowns on its 2 measurements a frame.
         self.freedom = np.maximum(2.0 * seen.sum(axis=0) - 3.0, 1.0)
-        self._free = np.delete(np.arange(len(seen)), reference)
+        self._others = np.delete(np.arange(len(seen)), reference)
+        self._complete = bool(seen.all())
+        self._shown = seen.astype(np.float64)
+        self._granted = self.freedom * tolerance**2
+        self._importance = np.sqrt(weight / self._granted)
 
     def subset(self, points: NDArray[np.int64]) -> Bundle:
         """The same window, some of its points."""
@@ -190,32 +235,37 @@ class Bundle:
         return other
 
     def project(self, e: Estimate) -> Projection:
-        """Where the cameras see the points."""
-        turned = e.R @ np.vstack([e.X[:, :2].T, np.ones(len(e.X))])
-        q = turned + e.t[:, :, None] * e.X[:, 2]
-        depth = np.maximum(q[:, 2], _NEAREST)
-        xy = q[:, :2] / depth[:, None]
-        square = np.einsum("kip,kip->kp", xy, xy)
-        return Projection(
-            turned, depth, xy, square, (np.exp(e.log_focal) * (1 + e.k1 * square))[:, None] * xy
-        )
+        """Where the cameras see the points, and how far that is from what was observed."""
+        rays = np.ones((*e.X.shape[:-2], 3, e.X.shape[-2]))
+        rays[..., :2, :] = e.X[..., :2].swapaxes(-1, -2)
+        turned = (e.R.reshape(*e.X.shape[:-2], -1, 3) @ rays).reshape(*e.t.shape, -1)
+        q = turned + e.t[..., None] * e.X[..., None, None, :, 2]
+        depth = np.maximum(q[..., 2, :], _NEAREST)
+        xy = q[..., :2, :] / depth[..., None, :]
+        square = xy[..., 0, :] * xy[..., 0, :] + xy[..., 1, :] * xy[..., 1, :]
+        u = (_focal(e) * (1 + _k1(e) * square))[..., None, :] * xy
+        residual = u - self.observed
+        if not self._complete:
+            residual = np.where(self.seen[:, None], residual, 0.0)
+        return Projection(turned, depth, xy, square, u, residual, _square(residual))
 
     def residual(self, e: Estimate) -> Array:
-        """Projection minus observation (K, 2, P), zero where unseen."""
-        return self._missed(self.project(e))
-
-    def _missed(self, p: Projection) -> Array:
-        return np.where(self.seen[:, None], p.u - self.observed, 0.0)
+        """Projection minus observation (..., K, 2, P), zero where unseen."""
+        return self.project(e).residual
 
     def rms(self, residual: Array) -> Array:
         """Root of the mean square residual of each point (P,), normalised units, its own unknowns taken
         off."""
         return np.asarray(np.sqrt(_square(residual) / self.freedom))
 
-    def cost(self, residual: Array, width: float) -> float:
-        """Mean of e^2 / (1 + e^2) over the points, e = rms / (width * tolerance): 0 all fit, 1 none does."""
-        square = _square(residual) / (self.freedom * (width * self.tolerance) ** 2)
-        return float((self.weight * square / (1 + square)).sum() / self.weight.sum())
+    def cost(self, residual: Array, width: float) -> Array:
+        """Mean (...) of e^2 / (1 + e^2) over the points, e = rms / (width * tolerance): 0 all fit, 1 none
+        does."""
+        return self._cost(_square(residual), width)
+
+    def _cost(self, error: Array, width: float) -> Array:
+        square = error / (self._granted * width**2)
+        return np.asarray((square / (1 + square)) @ self.weight / self.weight.sum())
 
     def solve(self, e: Estimate, widths: list[float], translate: bool = True) -> Estimate:
         """Levenberg-Marquardt, one step per entry of ``widths``, the widths of the robust cost, usually
@@ -223,32 +273,45 @@ class Bundle:
 
         ``translate=False`` keeps the cameras in place: they only turn.
         """
-        damping, idle = 1e-3, 0
+        return self.solve_each([e], widths, translate)[0]
+
+    def solve_each(
+        self, estimates: Sequence[Estimate], widths: list[float], translate: bool = True
+    ) -> list[Estimate]:
+        """The same from several estimates, each by itself, but in one go: most of a step's time is taken by
+        calls, not by numbers."""
+        found, left = list(estimates), np.arange(len(estimates))
+        e = Estimate.stacked(estimates)
+        damping, idle = np.full(len(left), 1e-3), np.zeros(len(left), dtype=np.int64)
         seen = self.project(e)
         for place, width in enumerate(widths):
-            residual = self._missed(seen)
-            step = self._step(e, seen, residual, width, damping, translate)
+            step = self._step(e, seen, width, damping, translate)
             seen_then = self.project(step)
-            before, after = self.cost(residual, width), self.cost(self._missed(seen_then), width)
-            if after <= before * (1 + 1e-9):
-                e, seen, damping = step, seen_then, max(damping / 5, 1e-7)
-            else:
-                damping *= 10
-            idle = idle + 1 if abs(after - before) < _IDLE * before else 0
-            if idle == 2 and set(widths[place:]) == {width}:
+            before, after = self._cost(seen.error, width), self._cost(seen_then.error, width)
+            better = after <= before * (1 + 1e-9)
+            e, seen = _where(better, step, e), _where(better, seen_then, seen)
+            damping = np.where(better, np.maximum(damping / 5, 1e-7), damping * 10)
+            idle = np.where(np.abs(after - before) < _IDLE * before, idle + 1, 0)
+            done = (idle == 2) & (set(widths[place:]) == {width})
+            if done.any() or place == len(widths) - 1:
+                for number, estimate in zip(left.tolist(), e.each(), strict=True):
+                    found[number] = estimate
+                left, damping, idle = left[~done], damping[~done], idle[~done]
+                e, seen = _some(e, ~done), _some(seen, ~done)
+            if not len(left):
                 break
-        return e
+        return found
 
     def solve_points(self, e: Estimate, iterations: int, nearest: float = np.inf) -> Estimate:
         """Points alone, each by itself, none with an inverse depth over ``nearest``; cameras fixed."""
-        damping = np.full(len(e.X), 1e-3)
+        return self._solve_points(e, iterations, nearest, np.full(len(e.X), 1e-3))
+
+    def _solve_points(self, e: Estimate, iterations: int, nearest: float, damping: Array) -> Estimate:
         seen = self.project(e)
-        residual = self._missed(seen)
-        cost = _square(residual)
-        for _ in range(iterations):
-            J = self._by_point(e, self._by_place(e, seen))
+        for iteration in range(1, iterations + 1):
+            J = self._by_point(e, self._by_place(e, seen, self._shown))
             V = np.einsum("kaip,kbip->abp", J, J)
-            g = np.einsum("kaip,kip->ap", J, residual)
+            g = np.einsum("kaip,kip->ap", J, seen.residual)
             for axis in range(3):
                 V[axis, axis] += damping * V[axis, axis] + 1e-9
             X = e.X - Triangles(V).solve(g).T
@@ -259,16 +322,28 @@ class Bundle:
                 pull = g[:2, beyond] + V[:2, 2, beyond] * (held - e.X[:, 2])[beyond]
                 X[beyond, :2] = e.X[beyond, :2] - Triangles(V[:2, :2, beyond]).solve(pull).T
                 X[:, 2] = held
-            moved = replace(e, X=X)
-            seen_then = self.project(moved)
-            new = self._missed(seen_then)
-            square = _square(new)
-            better = square <= cost
+            seen_then = self.project(replace(e, X=X))
+            better = seen_then.error <= seen.error
             e = replace(e, X=np.where(better[:, None], X, e.X))
-            seen = seen_then if better.all() else self.project(e)
-            residual = np.where(better, new, residual)
-            cost = np.where(better, square, cost)
             damping = np.where(better, damping / 10, damping * 10)
+            left = np.flatnonzero(np.abs(seen_then.error - seen.error) > _SETTLED * seen.error)
+            if 2 * len(left) < len(better):
+                # The few that still move go on by themselves.
+                X = e.X.copy()
+                if len(left):
+                    few = replace(e, X=X[left])
+                    X[left] = (
+                        self.subset(left)._solve_points(few, iterations - iteration, nearest, damping[left]).X
+                    )
+                return replace(e, X=X)
+            # The points are last in each array.
+            seen = (
+                seen_then
+                if better.all()
+                else Projection(
+                    *(np.where(better, x, y) for x, y in zip(_values(seen_then), _values(seen), strict=True))
+                )
+            )
         return e
 
     def spread_of_nearness(self, e: Estimate) -> Array:
@@ -276,10 +351,13 @@ class Bundle:
 
         Of one whose bearing and depth cannot be told apart it is large, not infinite.
         """
-        own = self._by_point(e, self._by_place(e, self.project(e)))
-        V = np.einsum("kaip,kbip->pab", own, own)
-        V += (1e-9 * np.einsum("paa->p", V) + 1e-12)[:, None, None] * np.eye(3)
-        return np.asarray(self.tolerance * np.sqrt(self.freedom * np.linalg.inv(V)[:, 2, 2]))
+        own = self._by_point(e, self._by_place(e, self.project(e), self._shown))
+        V = np.einsum("kaip,kbip->abp", own, own)
+        trace = np.einsum("aap->p", V)
+        for axis in range(3):
+            V[axis, axis] += 1e-9 * trace + 1e-12
+        last = Triangles(V).halfway(np.eye(3)[:, 2:])[2]  # its square is the last of the inverse
+        return np.asarray(self.tolerance * np.sqrt(self.freedom) * last)
 
     def without_places(self, e: Estimate, translate: bool) -> Freed:
         """Residuals and their derivatives by cameras and lens, what each point's own place can make up for
@@ -288,131 +366,169 @@ class Bundle:
         ``translate=False``: the cameras only turn, all points are far.
         """
         p = self.project(e)
-        J, own = self._derivatives(e, p)
-        if not translate:
-            J[:, 3:6] = 0.0
-            own[:, 2] = 0.0
-        residual = self._missed(p)
+        J, own = self._linearised(e, p, self._shown, translate)
         # A point that is held as far as it may be cannot go farther.
-        farther = np.einsum("kip,kip->p", own[:, 2], residual) > 0
+        farther = np.einsum("kip,kip->p", own[:, 2], p.residual) > 0
         own[:, 2, :, (e.X[:, 2] <= self.farthest) & farther] = 0.0
         V = np.einsum("kaip,kbip->abp", own, own)
         trace = np.einsum("aap->p", V)
         for axis in range(3):
             V[axis, axis] += 1e-9 * trace + 1e-12
-        points = Triangles(V)
-        made_up = points.halfway(self._against_points(J, own))
-        missed = points.halfway(np.einsum("kaip,kip->ap", own, residual))
-        return Freed(self._free, J, residual, np.ascontiguousarray(made_up.transpose(2, 1, 0)), missed.T)
+        own = Triangles(V[:, :, None, None]).halfway(own.swapaxes(0, 1))
+        return Freed(self._others, J, self._made_up(J[None], own[:, None])[0])
 
-    def _derivatives(self, e: Estimate, p: Projection) -> tuple[Array, Array]:
-        """Derivatives of the projections by camera (rotation, place) and lens (K, 8, 2, P), and by point
-        (K, 3, 2, P); zero where unseen."""
-        by_q, v = self._by_place(e, p), p.turned[:, :, None]
-        J = np.empty((len(e.R), 6 + _GLOBALS, 2, len(e.X)))
+    def _linearised(self, e: Estimate, p: Projection, weight: Array, translate: bool) -> tuple[Array, Array]:
+        """Derivatives of the projections by camera (rotation, place) and lens, and the residuals
+        (..., K, 9, 2, P); derivatives by point (..., K, 3, 2, P).
+
+        All times a weight (..., K, P), which is zero where unseen.
+        """
+        by_q, v = self._by_place(e, p, weight), p.turned[..., None, :]
+        own = self._by_point(e, by_q)
+        J = np.empty((*by_q.shape[:-3], 6 + _GLOBALS + 1, *by_q.shape[-2:]))
         for axis in range(3):  # v x dq
             after, last = (axis + 1) % 3, (axis + 2) % 3
-            np.multiply(v[:, after], by_q[:, last], out=J[:, axis])
-            J[:, axis] -= v[:, last] * by_q[:, after]
-        np.multiply(by_q, e.X[:, 2], out=J[:, 3:6])
-        np.multiply(p.u, self.seen[:, None], out=J[:, 6])
-        np.multiply(p.xy, (np.exp(e.log_focal) * p.square * self.seen)[:, None], out=J[:, 7])
-        return J, self._by_point(e, by_q)
+            np.multiply(v[..., after, :, :], by_q[..., last, :, :], out=J[..., axis, :, :])
+            J[..., axis, :, :] -= v[..., last, :, :] * by_q[..., after, :, :]
+        if translate:
+            np.multiply(by_q, e.X[..., None, None, None, :, 2], out=J[..., 3:6, :, :])
+        else:
+            J[..., 3:6, :, :] = own[..., 2, :, :] = 0.0
+        np.multiply(p.u, weight[..., None, :], out=J[..., 6, :, :])
+        np.multiply(p.xy, (_focal(e) * p.square * weight)[..., None, :], out=J[..., 7, :, :])
+        np.multiply(p.residual, weight[..., None, :], out=J[..., 8, :, :])
+        return J, own
 
-    def _by_place(self, e: Estimate, p: Projection) -> Array:
-        """Derivatives of the projections by q (K, 3, 2, P)."""
-        scale = np.exp(e.log_focal) * self.seen / p.depth
-        by_q = np.empty((len(scale), 3, 2, scale.shape[1]))
-        np.multiply(p.xy[:, :, None], (2 * e.k1 * scale)[:, None, None] * p.xy[:, None], out=by_q[:, :2])
-        straight = scale * (1 + e.k1 * p.square)
+    def _by_place(self, e: Estimate, p: Projection, weight: Array) -> Array:
+        """Derivatives of the projections by q (..., K, 3, 2, P), times a weight (..., K, P)."""
+        scale = _focal(e) * weight / p.depth
+        by_q = np.empty((*p.xy.shape[:-2], 3, *p.xy.shape[-2:]))
+        bent = (2 * _k1(e) * scale)[..., None, :] * p.xy
+        straight = scale * (1 + _k1(e) * p.square)
         for axis in range(2):
-            by_q[:, axis, axis] += straight
-        np.einsum("kqip,kqp->kip", by_q[:, :2], -p.xy, out=by_q[:, 2])
+            np.multiply(p.xy[..., axis, None, :], bent, out=by_q[..., axis, :, :])
+            by_q[..., axis, axis, :] += straight
+        np.multiply(by_q[..., 0, :, :], p.xy[..., 0, None, :], out=by_q[..., 2, :, :])
+        by_q[..., 2, :, :] += by_q[..., 1, :, :] * p.xy[..., 1, None, :]
+        np.negative(by_q[..., 2, :, :], out=by_q[..., 2, :, :])
         return by_q
 
     def _by_point(self, e: Estimate, by_q: Array) -> Array:
-        """Derivatives of the projections by (a, b, rho), (K, 3, 2, P)."""
-        axes = np.stack([e.R[:, :, 0], e.R[:, :, 1], e.t], axis=1)  # dq / d(a, b, rho)
-        return (axes @ by_q.reshape(len(axes), 3, -1)).reshape(by_q.shape)
+        """Derivatives of the projections by (a, b, rho), (..., K, 3, 2, P)."""
+        axes = np.stack([e.R[..., 0], e.R[..., 1], e.t], axis=-2)  # dq / d(a, b, rho)
+        return (axes @ by_q.reshape(*axes.shape[:-1], -1)).reshape(by_q.shape)
 
-    def _step(
-        self, e: Estimate, p: Projection, residual: Array, width: float, damping: float, translate: bool
-    ) -> Estimate:
-        """One damped Gauss-Newton step: points are eliminated, cameras and lens solved, points filled in
-        again."""
-        J, own = self._derivatives(e, p)
-        if not translate:
-            J[:, 3:6] = 0.0
-            own[:, 2] = 0.0
-        square = _square(residual) / (self.freedom * (width * self.tolerance) ** 2)
-        weight = self.weight / (1 + square) ** 2 / self.tolerance**2 / self.freedom
-        U, gradient = self._of_cameras(e, J, residual, weight)
-        own_heavy = own * weight
-        V = np.einsum("kaip,kbip->abp", own_heavy, own)
-        trace = np.einsum("aap->p", V) + 1e-12 * float(weight.max(initial=1.0))
+    def _step(self, e: Estimate, p: Projection, width: float, damping: Array, translate: bool) -> Estimate:
+        """One damped Gauss-Newton step of each of S estimates: points are eliminated, cameras and lens
+        solved, points filled in again."""
+        # The robust weight belongs to squares.
+        root = self._importance / (1 + p.error / (self._granted * width**2))
+        J, own = self._linearised(e, p, self._shown * root[:, None], translate)
+        V = np.einsum("skaip,skbip->absp", own, own)
+        trace = V[0, 0] + V[1, 1] + V[2, 2] + 1e-12 * (root**2).max(axis=1, initial=1.0, keepdims=True)
         for axis in range(3):
-            V[axis, axis] += (1e-3 * damping + 1e-12) * trace
-        points = Triangles(V)
-        half = points.halfway(self._against_points(J, own_heavy))
-        own_half = points.halfway(np.einsum("kaip,kip->ap", own_heavy, residual))
-        eliminated = half.reshape(len(half), -1)
-        S = U - eliminated @ eliminated.T
-        S += np.diag(damping * np.diag(U) + 1e-9 * np.trace(U) / len(U))
-        shared_step = -np.asarray(np.linalg.solve(S, gradient - eliminated @ own_half.ravel()), np.float64)
-        own_step = points.rest(-own_half - (shared_step @ eliminated).reshape(own_half.shape))
-        return self._moved(e, shared_step, own_step.T, translate)
+            V[axis, axis] += (1e-3 * damping[:, None] + 1e-12) * trace
+        points = Triangles(V[..., None, None, :])
+        own = points.halfway(own.transpose(2, 0, 1, 3, 4))
+        rows = self._made_up(J, own).reshape(len(J), -1, 3 * len(e.X[0]))
+        U = self._of_cameras(e, J)
+        left = U - rows @ rows.transpose(0, 2, 1)
+        unknowns = np.arange(len(U[0]) - 1)
+        diagonal = U[:, unknowns, unknowns]
+        left[:, unknowns, unknowns] += damping[:, None] * diagonal + 1e-9 * diagonal.mean(axis=1)[:, None]
+        shared_step = -np.asarray(np.linalg.solve(left[:, :-1, :-1], left[:, :-1, -1:]), np.float64)[..., 0]
+        along = np.concatenate([shared_step, np.ones((len(U), 1))], axis=1)[:, None] @ rows
+        own_step = -points.rest(along.reshape(len(U), 3, 1, 1, -1).swapaxes(0, 1))[:, :, 0, 0]
+        return self._moved(e, shared_step, own_step.transpose(1, 2, 0), translate)
 
-    def _against_points(self, J: Array, own: Array) -> Array:
-        """Products (shared, 3, P) of the derivatives by cameras and lens with those by points."""
-        cross = np.einsum("kcip,kaip->kcap", J, own)
-        with_cameras = cross[self._free, :6].reshape(-1, *cross.shape[2:])
-        return np.concatenate([with_cameras, cross[:, 6:].sum(axis=0)])
+    def _made_up(self, J: Array, own: Array) -> Array:
+        """Products (S, N + 1, 3, P) of the derivatives by cameras and lens, and of the residuals
+        (S, K, 9, 2, P), with those by points (3, S, K, 2, P)."""
+        count = 6 * (len(self.seen) - 1)
+        products = np.empty((len(J), count + _GLOBALS + 1, 3, J.shape[-1]))
+        cameras = products[:, :count].reshape(len(J), -1, 6, *products.shape[2:])
+        before = self.reference
+        for here, there in ((slice(before), slice(before)), (slice(before, None), slice(before + 1, None))):
+            np.einsum("skcip,askip->skcap", J[:, there, :6], own[:, :, there], out=cameras[:, here])
+        np.einsum("skcip,askip->scap", J[:, :, 6:], own, out=products[:, count:])
+        return products
 
-    def _of_cameras(self, e: Estimate, J: Array, residual: Array, weight: Array) -> tuple[Array, Array]:
-        """Normal equations of cameras and lens alone (shared, shared), and their gradient (shared,)."""
-        U, gradient = _normal_equations(self._free, J, residual, weight)
-        U[-_GLOBALS:, -_GLOBALS:] += np.diag(1 / self.lens_spread**2)
-        gradient[-_GLOBALS:] += (e.lens - self.lens_prior) / self.lens_spread**2
-        return U, gradient
+    def _of_cameras(self, e: Estimate, J: Array) -> Array:
+        """Normal equations (S, N + 1, N + 1) of cameras and lens alone, the gradient in the last column."""
+        U = _normal_equations(self._others, J)
+        lens = np.arange(-_GLOBALS - 1, -1)
+        U[:, lens, lens] += 1 / self.lens_spread**2
+        U[:, lens, -1] += (e.lens - self.lens_prior) / self.lens_spread**2
+        return U
 
     def _moved(self, e: Estimate, shared_step: Array, own_step: Array, translate: bool) -> Estimate:
-        """The estimate after a step, its free scale fixed: root mean square of the camera's distances 1, rho
-        >= 0."""
-        cameras = shared_step[:-_GLOBALS].reshape(-1, 6)
+        """The estimates after a step, their free scale fixed: root mean square of the camera's distances 1,
+        rho >= 0."""
+        others = self._others
+        cameras = shared_step[:, :-_GLOBALS].reshape(len(shared_step), -1, 6)
         R, t = e.R.copy(), e.t.copy()
-        R[self._free] = rotation(cameras[:, :3]) @ e.R[self._free]
+        R[:, others] = rotation(cameras[..., :3]) @ e.R[:, others]
         X = e.X + own_step
         if translate:
-            t[self._free] += cameras[:, 3:]
-            scale = float(np.sqrt((t**2).sum() / max(len(self._free), 1)))
-            if scale > 1e-9:
-                t /= scale
-                X[:, 2] *= scale
-        X[:, 2] = np.maximum(X[:, 2], self.farthest)
-        lens = e.lens + shared_step[-_GLOBALS:]
-        low, high = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
-        log_focal, k1 = np.clip(lens, low, high)
-        return Estimate(R, t, X, float(log_focal), float(k1))
+            t[:, others] += cameras[..., 3:]
+            scale = np.sqrt((t * t).sum(axis=(1, 2)) / max(len(others), 1))
+            scale = np.where(scale > 1e-9, scale, 1.0)
+            t /= scale[:, None, None]
+            X[..., 2] *= scale[:, None]
+        X[..., 2] = np.maximum(X[..., 2], self.farthest)
+        least, most = self.lens_prior - 3 * self.lens_spread, self.lens_prior + 3 * self.lens_spread
+        lens = np.minimum(np.maximum(e.lens + shared_step[:, -_GLOBALS:], least), most)
+        return Estimate(R, t, X, lens[:, 0], lens[:, 1])
 
 
-def _normal_equations(
-    free: NDArray[np.int64], J: Array, residual: Array, weight: Array
-) -> tuple[Array, Array]:
-    """Those of cameras and lens (shared, shared) and their gradient (shared,), points where they are."""
-    # A camera's unknowns touch its own measurements only: blocks (K, 8, 8) instead of one matrix.
-    heavy = (J * weight).reshape(*J.shape[:2], -1)
-    blocks = heavy @ J.reshape(heavy.shape).transpose(0, 2, 1)
-    pull = (heavy @ residual.reshape(len(J), -1, 1))[:, :, 0]
-    count = 6 * len(free)
-    U = np.zeros((count + _GLOBALS, count + _GLOBALS))
-    each = np.arange(len(free))
-    U[:count, :count].reshape(len(free), 6, len(free), 6)[each, :, each] = blocks[free, :6, :6]
-    U[:count, count:] = blocks[free, :6, 6:].reshape(count, _GLOBALS)
-    U[count:, :count] = U[:count, count:].T
-    U[count:, count:] = blocks[:, 6:, 6:].sum(axis=0)
-    return U, np.append(pull[free, :6].ravel(), pull[:, 6:].sum(axis=0))
+def _normal_equations(others: NDArray[np.int64], J: Array) -> Array:
+    """Those of cameras and lens (..., N + 1, N + 1), points where they are, the gradient in the last column;
+    from derivatives and residuals (..., K, 9, 2, P)."""
+    # A camera's unknowns touch its own measurements only: blocks (K, 9, 8) instead of one matrix.
+    rows = J.reshape(*J.shape[:-2], -1)
+    blocks = rows @ rows[..., :-1, :].swapaxes(-1, -2)
+    cameras, stack = blocks[..., others, :, :], J.shape[:-4]
+    each, count = np.arange(len(others)), 6 * len(others)
+    U = np.zeros((*stack, count + _GLOBALS + 1, count + _GLOBALS + 1))
+    by_camera = U[..., :count, :count].reshape(*stack, len(each), 6, len(each), 6).swapaxes(-3, -2)
+    by_camera[..., each, each, :, :] = cameras[..., :6, :6]
+    U[..., count:, :count] = cameras[..., 6:, :6].swapaxes(-3, -2).reshape(*stack, -1, count)
+    U[..., :count, count:] = U[..., count:, :count].swapaxes(-1, -2)
+    U[..., count:, count:-1] = blocks[..., 6:, 6:].sum(axis=-3)
+    U[..., count:-1, -1] = U[..., -1, count:-1]
+    return U
+
+
+def _focal(e: Estimate) -> Array:
+    """Focal length, to go with arrays (..., K, P)."""
+    return np.asarray(np.exp(e.log_focal))[..., None, None]
+
+
+def _k1(e: Estimate) -> Array:
+    """Radial distortion, to go with arrays (..., K, P)."""
+    return np.asarray(e.k1)[..., None, None]
 
 
 def _square(residual: Array) -> Array:
-    """Sum of squares of each point's residuals (K, 2, P)."""
-    return np.asarray(np.einsum("kip,kip->p", residual, residual))
+    """Sum of squares of each point's residuals (..., K, 2, P)."""
+    return np.asarray(np.einsum("...kip,...kip->...p", residual, residual))
+
+
+def _values(every: Estimate | Projection) -> list[Any]:
+    return [getattr(every, entry.name) for entry in fields(every)]
+
+
+def _some(stack: _Stack, which: Bools) -> _Stack:
+    """Those of a stack (S, ...) that are chosen (S,)."""
+    return type(stack)(*(values[which] for values in _values(stack)))
+
+
+def _where(better: Bools, new: _Stack, old: _Stack) -> _Stack:
+    """Of a stack (S, ...) the new ones where these are better (S,), else the old ones."""
+    if better.all() or not better.any():
+        return new if better.all() else old
+    chosen = [
+        np.where(better.reshape(-1, *[1] * (x.ndim - 1)), x, y)
+        for x, y in zip(_values(new), _values(old), strict=True)
+    ]
+    return type(new)(*chosen)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,7 @@ class Cues:
         self.noise = self.typical_inside = 0.0
         self.leeway: Leeway | None = None
         self._groups: dict[bytes, Group] = {}
-        self._worldly: dict[bytes, tuple[float, float, Array]] = {}
+        self._worldly: dict[bytes, dict[str, Any]] = {}
         self._pairs: dict[tuple[bytes, bytes], list[float]] = {}
 
     def __getstate__(self) -> dict[str, object]:
@@ -121,7 +122,7 @@ class Cues:
     def groups(self, segments: list[tuple[Members, Members]]) -> list[Group]:
         """Groups of the segments that a window starts with: (members, reliable) each. The first that are
         asked for tell how noisy tracks are, and what shear is usual inside a segment."""
-        found = [self.group(members, reliable) for members, reliable in segments]
+        found = self._each(segments)
         if not self.noise:
             own = [median(g.rigid[g.sample]) for g in found if len(g.sample) >= _LEAST_FOR_NOISE]
             insides = [g.inside for g in found if np.isfinite(g.inside)]
@@ -131,19 +132,28 @@ class Cues:
 
     def group(self, members: Members, reliable: Members) -> Group:
         """Measure a group by itself."""
-        key = reliable.tobytes()
-        if key not in self._groups:
-            self._groups[key] = self._measured(members, reliable)
-        if key not in self._worldly:
-            self._worldly[key] = self._in_this_world(reliable, self._groups[key].sample)
-        evidence, yielding, depth = self._worldly[key]
-        return replace(self._groups[key], members=members, evidence=evidence, yielding=yielding, depth=depth)
+        return self._each([(members, reliable)])[0]
 
-    def _in_this_world(self, reliable: Members, sample: Members) -> tuple[float, float, Array]:
-        """Both evidences and the depth of a group."""
-        evidence = median(self.evidence[reliable])
-        yielding = evidence if self.leeway is None else self.leeway.evidence(sample)
-        return evidence, yielding, _deciles(self.nearness[reliable])
+    def _each(self, parts: list[tuple[Members, Members]]) -> list[Group]:
+        keys = [reliable.tobytes() for _, reliable in parts]
+        for key, (members, reliable) in zip(keys, parts, strict=True):
+            if key not in self._groups:
+                self._groups[key] = self._measured(members, reliable)
+        self._place([key for key in dict.fromkeys(keys) if key not in self._worldly])
+        return [
+            replace(self._groups[key], members=members, **self._worldly[key])
+            for key, (members, _) in zip(keys, parts, strict=True)
+        ]
+
+    def _place(self, keys: list[bytes]) -> None:
+        """Keep what groups are in this static world: both evidences, and the depth."""
+        groups = [self._groups[key] for key in keys]
+        evidence = [median(self.evidence[group.reliable]) for group in groups]
+        samples = [group.sample for group in groups]
+        yielding = evidence if self.leeway is None else self.leeway.evidence(samples)
+        for key, group, held, gave_way in zip(keys, groups, evidence, yielding, strict=True):
+            depth = _deciles(self.nearness[group.reliable])
+            self._worldly[key] = {"evidence": held, "yielding": gave_way, "depth": depth}
 
     def _measured(self, members: Members, reliable: Members) -> Group:
         """What does not depend on the static world."""

@@ -9,6 +9,8 @@ that lie where nothing holds the cameras bend them to their own motion. The trut
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,27 +43,34 @@ class Leeway:
         self._scale = 1 / (grant**2 * world.bundle.freedom)
         self._threshold = threshold
         few = core[:: 1 + (len(core) - 1) // REFIT_POINTS]
-        self._held = self._information(few, 1 / (1 + self._square(few) / _DOUBTFUL**2) ** 2)[0]
-        lens = np.zeros(len(self._held))
-        lens[-2:] = 1 / world.bundle.lens_spread**2
-        self._held += np.diag(lens)
+        sure, scale = self._freed.subset(few[None]), self._scale[few]
+        square = sure.square() * scale
+        self._held = sure.information(scale / (1 + square / _DOUBTFUL**2) ** 2)[0][0]
+        lens = np.arange(-2, 0)
+        self._held[lens, lens] += 1 / world.bundle.lens_spread**2
 
-    def evidence(self, points: NDArray[np.int64]) -> float:
-        """Median distance of some points (n,) from static points' ways, in the units of `World.evidence`,
-        after the cameras gave way to them."""
-        square = self._square(points)
+    def evidence(self, groups: Sequence[NDArray[np.int64]]) -> list[float]:
+        """Median distance of each group's points (n,) from static points' ways, in the units of
+        `World.evidence`, after the cameras gave way to them."""
+        if not groups:
+            return []
+        sizes = [len(points) for points in groups]
+        # As many of each, some more than once, which do not count.
+        place = np.arange(max(sizes))
+        padded = np.stack([points[place % len(points)] for points in groups])
+        counts = place < np.array(sizes)[:, None]
+        freed, scale = self._freed.subset(padded), self._scale[padded]
+        square = freed.square() * scale
+        typical = np.array([max(median(own[:size]), 1e-12) for own, size in zip(square, sizes, strict=True)])
         # Most of them decide; what fits worse than those is weighed down.
-        weight = 1 / (1 + square / max(median(square), 1e-12)) ** 2
-        information, pull = self._information(points, weight)
+        weight = np.where(counts, scale, 0.0) / (1 + square / typical[:, None]) ** 2
+        information, pull = freed.information(weight)
         held = self._held + information
-        held.flat[:: len(held) + 1] += _GAUGE * np.trace(held) / len(held)
-        after = self._square(points, -np.asarray(np.linalg.solve(held, pull), np.float64))
-        return float(np.sqrt(median(after))) / self._threshold
-
-    def _square(self, points: NDArray[np.int64], step: Array | None = None) -> Array:
-        """Mean square error of points (n,) after a step of the cameras, in units of what is usual."""
-        return np.asarray(self._freed.square(points, step) * self._scale[points])
-
-    def _information(self, points: NDArray[np.int64], weight: Array) -> tuple[Array, Array]:
-        """What points tell of the cameras: matrix (N, N) and pull (N,) of the normal equations."""
-        return self._freed.information(points, weight * self._scale[points])
+        unknowns = np.arange(len(self._held))
+        held[:, unknowns, unknowns] += _GAUGE * np.trace(held, axis1=1, axis2=2)[:, None] / len(unknowns)
+        step = -np.asarray(np.linalg.solve(held, pull[..., None]), np.float64)[..., 0]
+        after = freed.square(step) * scale
+        return [
+            float(np.sqrt(median(own[:size]))) / self._threshold
+            for own, size in zip(after, sizes, strict=True)
+        ]

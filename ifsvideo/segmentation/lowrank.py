@@ -63,6 +63,8 @@ class Subspace:
         """The subspace of fewer dimensions in which most of the trajectories' (2F, P) spread lies."""
         if rank >= self.rank:
             return self
+        if seen.all():
+            return Subspace(self.directions[:, :rank], self.mean)  # `fit` has them in this order
         inside = self._coordinates(W, seen)
         mean = inside.mean(axis=1)
         spread = self.directions @ principal(inside - mean[:, None], self.rank)
@@ -82,8 +84,16 @@ class Subspace:
             Root of the mean square distance per frame, pixels, with the degrees of freedom that the point
             itself spends taken off; 0 where it has no more measurements than those.
         """
-        error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
-        free = np.maximum((seen.sum(axis=0) - self.rank) / 2, 0.5)
+        if seen.all():
+            # What is left of trajectories is the same product of all: one system for all points.
+            M, inner = self.directions, self.directions.T @ self.directions
+            inner.flat[:: self.rank + 1] += 1e-6 * (np.trace(inner) + 1e-9)
+            aside = np.eye(len(M)) - M @ np.linalg.solve(inner, M.T)
+            error, measured = aside @ (W - self.mean[:, None]), np.float64(len(W))
+        else:
+            error = (W - self.mean[:, None] - self.directions @ self._coordinates(W, seen)) * seen
+            measured = seen.sum(axis=0)
+        free = np.maximum((measured - self.rank) / 2, 0.5)
         return np.asarray(np.sqrt(np.einsum("fp,fp->p", error, error) / free))
 
     def _coordinates(self, W: Array, seen: Array) -> Array:
@@ -98,15 +108,16 @@ class Subspace:
 
 
 def principal(X: Array, rank: int) -> Array:
-    """The first left singular vectors of X (R, C), times their singular values (R, rank).
+    """The first left singular vectors of X (..., R, C), times their singular values (..., R, rank).
 
     By way of the smaller of its two products with itself, in half the time; a direction that holds less than
     1e-8 of the spread is lost by it.
     """
-    if len(X) > X.shape[1]:
-        return np.asarray(X @ np.linalg.eigh(X.T @ X)[1][:, ::-1][:, :rank])
-    square, U = np.linalg.eigh(X @ X.T)
-    return np.asarray((U * np.sqrt(np.maximum(square, 0.0)))[:, ::-1][:, :rank])
+    other = X.swapaxes(-1, -2)
+    if X.shape[-2] > X.shape[-1]:
+        return np.asarray(X @ np.linalg.eigh(other @ X)[1][..., ::-1][..., :rank])
+    square, U = np.linalg.eigh(X @ other)
+    return np.asarray((U * np.sqrt(np.maximum(square, 0.0))[..., None, :])[..., ::-1][..., :rank])
 
 
 def along_mean_path(W: NDArray[np.float64], seen: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -30,6 +30,32 @@ from ifsvideo.types import UNDECIDED, Segmentation, Tracks
 
 
 @dataclass(frozen=True)
+class _Prepared:
+    """What no chance decides, and is the same however often a window is segmented.
+
+    Attributes
+    ----------
+    measured : Tracks
+        Without the lens's bend.
+    tracks : Tracks
+        Without their noise, too.
+    size : (width, height) of the picture, pixels
+    unit : float, pixels of the picture per pixel of a 640x480 one
+    base : int, frame in which disks lie
+    anchor : (P, 2) float, places in the base frame, the mean ones of points not seen there
+    graph : (E, 2) int, neighbours
+    """
+
+    measured: Tracks
+    tracks: Tracks
+    size: tuple[int, int]
+    unit: float
+    base: int
+    anchor: NDArray[np.float64]
+    graph: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
 class IFSSegmenter:
     """Segments the tracks of one window; a `ifsvideo.types.Segmenter`.
 
@@ -71,40 +97,39 @@ class IFSSegmenter:
         confidence = np.zeros(tracks.points)
         details: dict[str, Any] = {}
         if len(usable):
-            chosen, size = self._in_a_straight_picture(tracks.select(usable))
-            rng = np.random.default_rng(self.seed)
+            rng, prepared = np.random.default_rng(self.seed), self._prepared(tracks.select(usable))
 
             def stages() -> Segmentation:
-                return self._stages(chosen, size, motions, rng)
+                return self._stages(prepared, motions, rng)
 
-            part = voted(stages, self.config.votes, Whole(chosen), motions) if self.alone else stages()
+            whole = Whole(prepared.measured) if self.alone else None
+            part = stages() if whole is None else voted(stages, self.config.votes, whole, motions)
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence
             details = dict(part.details, usable=usable)
         return Segmentation(labels, background, segments, confidence, details)
 
-    def _in_a_straight_picture(self, tracks: Tracks) -> tuple[Tracks, tuple[int, int]]:
-        """Tracks as a straight lens would have them, and the size of their picture."""
+    def _prepared(self, tracks: Tracks) -> _Prepared:
+        config = self.config
         tracks, size = in_a_picture(tracks)
-        if self.config.distortion:
-            tracks = replace(tracks, xy=undistort(tracks.xy, size, self.config.distortion))
-        return tracks, size
-
-    def _stages(
-        self, tracks: Tracks, size: tuple[int, int], motions: int | None, rng: np.random.Generator
-    ) -> Segmentation:
-        config, unit = self.config, float(np.hypot(*size)) / 800
-        tracks = smoothed(tracks, config.smoothing, unit)
+        if config.distortion:
+            tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
+        unit = float(np.hypot(*size)) / 800
+        measured, tracks = tracks, smoothed(tracks, config.smoothing, unit)
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
+        return _Prepared(measured, tracks, size, unit, base, anchor, delaunay_edges(anchor))
+
+    def _stages(self, prepared: _Prepared, motions: int | None, rng: np.random.Generator) -> Segmentation:
+        config, tracks, size, unit = self.config, prepared.tracks, prepared.size, prepared.unit
+        anchor, base = prepared.anchor, prepared.base
 
         # 1. What agrees with a static world seen by a moving camera.
         support, evidence, world = self._split(tracks, size, unit, rng)
         background = support >= 0.5
         # 2. and 3. Affine motion models in small disks, those that are needed; every point to one of them.
         models = sample_models(tracks, background, base, unit, config, rng)
-        graph = delaunay_edges(anchor)
         if len(models):
             residual = residuals(tracks, models, config.centred)
             cost = data_term(residual, models, 1 - support, unit, config)
@@ -115,7 +140,7 @@ class IFSSegmenter:
             else:
                 start = assign(tracks, models, residual, base, config.nearest_models)
             # 4. Segments with clean borders, more of them than motions.
-            chosen, solution = refine(tracks, models, cost, start, graph, unit, config)
+            chosen, solution = refine(tracks, models, cost, start, prepared.graph, unit, config)
             fit = residual[chosen, np.arange(tracks.points)] / unit
             details = {"models": models, "start": start, "solution": solution}
         else:
@@ -140,10 +165,10 @@ class IFSSegmenter:
                 # 6. What a mover predicts better than the static world does is its own.
                 reach = config.gap * unit
                 labels, confidence = contested(labels, confidence, window, world, cues, reach)
+            evidence = cues.evidence
             if self.alone:
                 apart = apart_from_each_other(labels, window, merging)
                 details |= {"doubt": merging.doubt, "apart": apart, "world": world}
-            evidence = cues.evidence
             details |= {"window": window, "joined": joined, "cues": cues, "merges": merging.merges}
         details |= {"fit": fit, "evidence": evidence, "anchor": anchor, "size": size}
         return Segmentation(labels, background, segments, confidence, details)

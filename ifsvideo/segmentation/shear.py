@@ -25,7 +25,8 @@ def shear_and_stretch(
     shear, stretch : (F-1, E) float
         Absolute changes; NaN where an end is not seen in both frames.
     """
-    x, y = np.moveaxis(tracks.xy[:, edges[:, 1]] - tracks.xy[:, edges[:, 0]], 2, 0)
+    start, end = edges.T
+    x, y = tracks.planes.take(end, axis=2) - tracks.planes.take(start, axis=2)
     cross = x[:-1] * y[1:] - y[:-1] * x[1:]
     shear = np.abs(np.arctan2(cross, x[:-1] * x[1:] + y[:-1] * y[1:]))
     return shear, np.abs(np.diff(np.sqrt(x * x + y * y), axis=0))
@@ -63,10 +64,14 @@ def between_edges(
         Indices of points, nearest first.
     """
     left = cdist(anchor[first], anchor[second])
-    chosen = np.empty((min(pairs, len(first), len(second)), 2), dtype=np.int64)
-    for edge in chosen:
+    rows: list[int] = []
+    columns: list[int] = []
+    for _ in range(min(pairs, len(first), len(second))):
         i, j = divmod(int(left.argmin()), len(second))
-        edge[:] = first[i], second[j]
+        rows.append(i)
+        columns.append(j)
         left[i] = np.inf
         left[:, j] = np.inf
+    chosen = np.empty((len(rows), 2), dtype=np.int64)
+    chosen[:, 0], chosen[:, 1] = first[rows], second[columns]
     return chosen

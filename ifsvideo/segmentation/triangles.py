@@ -10,10 +10,11 @@ Array = NDArray[np.float64]
 
 
 class Triangles:
-    """Symmetric positive matrices (N, N, P) of a few rows, one for each of P points, as L L^T with triangles
-    L (Cholesky)."""
+    """Symmetric positive matrices (N, N, ...) of a few rows, one for each of many points, as L L^T with
+    triangles L (Cholesky)."""
 
     def __init__(self, V: Array) -> None:
+        self._columns = V.shape[1:]
         self._L: list[list[Array]] = []
         for row in range(len(V)):
             L: list[Array] = []
@@ -26,17 +27,17 @@ class Triangles:
             self._L.append(L)
 
     def halfway(self, right: Array) -> Array:
-        """L^-1 times columns (..., N, P)."""
-        found = np.empty_like(right)
+        """L^-1 times columns (N, ...), one or more for each matrix."""
+        found = np.empty(np.broadcast_shapes(right.shape, self._columns))
         for row, L in enumerate(self._L):
-            rest = right[..., row, :]
+            rest = right[row]
             for column in range(row):
-                rest = rest - L[column] * found[..., column, :]
-            np.divide(rest, L[row], out=found[..., row, :])
+                rest = rest - L[column] * found[column]
+            np.divide(rest, L[row], out=found[row])
         return found
 
     def rest(self, half: Array) -> Array:
-        """L^-T times columns (N, P): what `halfway` left to do."""
+        """L^-T times columns (N, ...): what `halfway` left to do."""
         found = np.empty_like(half)
         for row in reversed(range(len(self._L))):
             rest = half[row]
@@ -46,5 +47,5 @@ class Triangles:
         return found
 
     def solve(self, right: Array) -> Array:
-        """Solutions (N, P) for right sides (N, P)."""
+        """Solutions (N, ...) for right sides (N, ...)."""
         return self.rest(self.halfway(right))

@@ -172,89 +172,144 @@ def _levels(nodes: int, edges: Indices) -> Indices:
     for p, q in edges.tolist():
         neighbours[p].append(q)
         neighbours[q].append(p)
-    colour = np.full(nodes, -1, np.int64).tolist()
+    colour = [0] * nodes
+    taken = [0] * nodes  # colours of each node's neighbours, as the bits of a number
     for p in sorted(range(nodes), key=lambda p: -len(neighbours[p])):
-        used = {colour[q] for q in neighbours[p]}
-        colour[p] = next(c for c in range(len(used) + 1) if c not in used)
+        free = ~taken[p] & (taken[p] + 1)  # the lowest bit that is not set
+        colour[p] = free.bit_length() - 1
+        for q in neighbours[p]:
+            taken[q] |= free
     return np.array(colour, np.int64)
 
 
 @dataclass(frozen=True)
-class _Level:
-    """The nodes that are updated at once, and their edges towards lower and higher levels.
+class _Side:
+    """The edges of a level's nodes towards lower levels, or towards higher ones.
 
-    ``lower`` and ``upper`` are the edges; ``lower_sum`` and ``upper_sum`` (nodes x edges) add up what runs
-    along them; ``lower_owner`` and ``upper_owner`` are the row of the node at the end in this level.
-    ``unary`` (nodes, L) are the nodes' own costs, labels ordered by attribute.
+    Attributes
+    ----------
+    own : slice
+        The edges, in the order of this end.
+    other : (n,) int
+        The same edges in the order of the other end.
+    owner : (n,) int
+        The node at this end, counted within the level.
+    ends : (n,) int
+        The node at the other end.
+    change, of_kind, both : (n,) float
+        Cost of another label, what another attribute adds to it, and their sum.
+    sums : (nodes, n) sparse
+        Adds up what runs along the edges.
+    """
+
+    own: slice
+    other: Indices
+    owner: Indices
+    ends: Indices
+    change: Array
+    of_kind: Array
+    both: Array
+    sums: Any
+
+
+@dataclass(frozen=True)
+class _Level:
+    """The nodes that are updated at once, and their edges.
+
+    Attributes
+    ----------
+    nodes : (n,) int
+    unary : (L, n) float
+        The nodes' own costs, labels ordered by attribute.
+    gamma : (n,) float
+        What an edge has of a node's costs.
+    lower, upper : _Side
     """
 
     nodes: Indices
     unary: Array
     gamma: Array
-    lower: Indices
-    upper: slice
-    lower_owner: Indices
-    upper_owner: Indices
-    lower_sum: Any
-    upper_sum: Any
+    lower: _Side
+    upper: _Side
 
 
 class _Messages:
     """Messages along the edges, and the two passes that renew them.
 
-    ``up`` (E, L) runs from an edge's lower node to its upper one, ``down`` the other way (Kolmogorov's M_st
-    and M_ts). Inside, labels are ordered by attribute, so that each kind is a slice. What a level's nodes are
-    told in one pass, their sums (nodes, L) ``from_below`` or ``from_above``, still holds in the next.
+    ``up`` (L, E) runs from an edge's lower node to its upper one, ``down`` the other way (Kolmogorov's M_st
+    and M_ts). Inside, labels are ordered by attribute, so that each kind is a slice, and they come first, so
+    that least costs are those of rows. Either way's edges are in the order of the ends where they begin: a
+    level's are written in a row. What a level's nodes are told in one pass, along each edge (L, edges)
+    ``below`` or ``above``, and their sums (L, n) ``from_below`` or ``from_above``, still holds in the next.
     """
 
     def __init__(self, problem: _Problem) -> None:
         self.problem = problem
         self.order = np.argsort(problem.attributes, kind="stable")
-        self.kinds = problem.attributes[self.order]
+        self.kinds = problem.attributes[self.order].astype(np.int64)
         self.split = int((~problem.attributes).sum())
-        self.unary = problem.unary[:, self.order]
-        shape = (len(problem.edges), problem.unary.shape[1])
-        self.up = np.zeros(shape)
-        self.down = np.zeros(shape)
-        self.schedule = [self._level(k) for k in range(int(problem.levels.max(initial=-1)) + 1)]
+        self.unary = problem.unary[:, self.order].T
+        shape = (len(self.unary), len(problem.edges))
+        self.up, self.down = np.zeros(shape), np.zeros(shape)
+        # A problem's edges are in the order of their lower ends.
+        by_upper = np.argsort(problem.levels[problem.edges[:, 1]], kind="stable")
+        place = np.argsort(by_upper)
+        every = np.arange(len(place))
+        self.schedule: list[_Level] = []
+        for number in range(int(problem.levels.max(initial=-1)) + 1):
+            nodes = np.flatnonzero(problem.levels == number)
+            lower = self._side(nodes, 1, by_upper, by_upper)
+            upper = self._side(nodes, 0, every, place)
+            busiest = np.maximum(*(np.bincount(side.owner, minlength=len(nodes)) for side in (lower, upper)))
+            gamma = 1.0 / np.maximum(busiest, 1)
+            unary = np.ascontiguousarray(self.unary[:, nodes])
+            self.schedule.append(_Level(nodes, unary, gamma, lower, upper))
+        self.above = [np.zeros((len(self.unary), len(level.upper.ends))) for level in self.schedule]
+        self.below = [np.zeros((len(self.unary), len(level.lower.ends))) for level in self.schedule]
         self.from_above = [np.zeros(level.unary.shape) for level in self.schedule]
         self.from_below = [np.zeros(level.unary.shape) for level in self.schedule]
 
-    def _level(self, number: int) -> _Level:
+    def _side(self, nodes: Indices, end: int, order: Indices, other: Indices) -> _Side:
+        """The edges that have one of their ends (0 the lower one, 1 the upper one) among a level's nodes.
+
+        Parameters
+        ----------
+        order : (E,) int
+            The edges in the order of this end.
+        other : (E,) int
+            Where in the order of the other end they are.
+        """
         problem = self.problem
-        nodes = np.flatnonzero(problem.levels == number)
+        levels = problem.levels[problem.edges[order, end]]
+        number = problem.levels[nodes[0]]
+        own = slice(*np.searchsorted(levels, [number, number + 1]).tolist())
+        edges = order[own]
         row = np.zeros(len(problem.levels), np.int64)
         row[nodes] = np.arange(len(nodes))
-        first, second = problem.edges.T
-        # In a row, so that nothing is copied to be read.
-        upper = slice(*np.searchsorted(problem.levels[first], [number, number + 1]).tolist())
-        lower = np.flatnonzero(problem.levels[second] == number)
-        owners = row[second[lower]], row[first[upper]]
-        sums = [
-            sparse.csr_array(
-                (np.ones(len(owner)), (owner, np.arange(len(owner)))), shape=(len(nodes), len(owner))
-            )
-            for owner in owners
-        ]
-        busiest = np.maximum(*(np.bincount(owner, minlength=len(nodes)) for owner in owners))
-        gamma = 1.0 / np.maximum(busiest, 1)
-        return _Level(nodes, self.unary[nodes], gamma, lower, upper, *owners, *sums)
+        owner = row[problem.edges[edges, end]]
+        first = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(nodes)))])
+        shape = (len(nodes), len(edges))
+        sums = sparse.csr_array((np.ones(len(edges)), np.argsort(owner, kind="stable"), first), shape=shape)
+        change, of_kind = problem.weights[edges], problem.attribute_weights[edges]
+        ends = problem.edges[edges, 1 - end]
+        return _Side(own, other[own], owner, ends, change, of_kind, change + of_kind, sums)
 
     def forward(self) -> Indices:
         """Renew the messages upwards; return the labelling (N,) fixed on the way.
 
         Each node takes the best label given those fixed below and the messages from above.
         """
-        problem = self.problem
-        labels = np.zeros(len(self.unary), np.int64)
+        labels = np.zeros(self.unary.shape[1], np.int64)
         for number, level in enumerate(self.schedule):
+            lower, upper = level.lower, level.upper
             from_above = level.unary + self.from_above[number]
-            agreed = self._agreement(level, labels[problem.edges[level.lower, 0]])
-            labels[level.nodes] = (from_above - agreed).argmin(1)
-            self.from_below[number] = level.lower_sum @ self.up[level.lower]
-            belief = from_above + self.from_below[number]
-            share = (level.gamma[:, None] * belief)[level.upper_owner]
-            self.up[level.upper], _ = self._message(share - self.down[level.upper], level.upper)
+            labels[level.nodes] = (from_above - self._agreement(level, labels[lower.ends])).argmin(0)
+            self.below[number] = self.up.take(lower.other, axis=1)
+            self.from_below[number] = (lower.sums @ self.below[number].T).T
+            share = (level.gamma * (from_above + self.from_below[number])).take(upper.owner, axis=1)
+            share -= self.above[number]
+            self._shorten(share, upper)
+            self.up[:, upper.own] = share
         return self.order[labels]
 
     def backward(self) -> float:
@@ -265,36 +320,38 @@ class _Messages:
         """
         bound = 0.0
         for number, level in reversed(list(enumerate(self.schedule))):
-            self.from_above[number] = level.upper_sum @ self.down[level.upper]
+            lower, upper = level.lower, level.upper
+            self.above[number] = self.down.take(upper.other, axis=1)
+            self.from_above[number] = (upper.sums @ self.above[number].T).T
             belief = level.unary + self.from_below[number] + self.from_above[number]
-            least = belief.min(axis=1, keepdims=True)
-            share = (level.gamma[:, None] * (belief - least))[level.lower_owner]
-            self.down[level.lower], rest = self._message(share - self.up[level.lower], level.lower)
+            least = belief.min(axis=0)
+            share = (level.gamma * (belief - least)).take(lower.owner, axis=1)
+            share -= self.below[number]
+            rest = self._shorten(share, lower)
+            self.down[:, lower.own] = share
             bound += float(least.sum() + rest.sum())
         return bound
 
-    def _message(self, cost: Array, edges: Indices | slice) -> tuple[Array, Array]:
-        """min over l of cost(l) + V(l, m), for all m, (n, L), less its own minimum (n,); in O(L).
-
-        Overwrites ``cost``.
-        """
-        change = self.problem.weights[edges, None]
-        other_kind = change + self.problem.attribute_weights[edges, None]
-        kinds = slice(None, self.split), slice(self.split, None)
-        least = [cost[:, kind].min(axis=1, keepdims=True, initial=np.inf) for kind in kinds]
+    def _shorten(self, cost: Array, side: _Side) -> Array:
+        """Put min over l of cost(l) + V(l, m) in the place of costs (L, n), for all labels m, less its own
+        minimum (n,), which is returned; in O(L)."""
+        kinds = cost[: self.split], cost[self.split :]
+        least = [kind.min(axis=0, initial=np.inf) for kind in kinds]
         for kind, same, other in zip(kinds, least, reversed(least), strict=True):
-            ceiling = np.minimum(same + change, other + other_kind)
-            np.minimum(cost[:, kind], ceiling, out=cost[:, kind])
-        lowest = np.minimum(*least)
-        return cost - lowest, lowest[:, 0]
+            np.minimum(kind, np.minimum(same + side.change, other + side.both), out=kind)
+        lowest = np.asarray(np.minimum(*least))
+        cost -= lowest
+        return lowest
 
     def _agreement(self, level: _Level, fixed: Indices) -> Array:
-        """What each label of a level's nodes (nodes, L) saves by agreeing with the labels (edges,) that are
+        """What each label of a level's nodes (L, n) saves by agreeing with the labels (edges,) that are
         fixed at the lower ends."""
-        shape, edges = level.unary.shape, level.lower
-        same = np.bincount(
-            level.lower_owner * shape[1] + fixed, self.problem.weights[edges], level.unary.size
-        )
-        place = level.lower_owner * 2 + self.kinds[fixed]
-        same_kind = np.bincount(place, self.problem.attribute_weights[edges], 2 * shape[0]).reshape(-1, 2)
-        return np.asarray(same.reshape(shape) + same_kind[:, self.kinds.astype(np.int64)])
+        labels, nodes = level.unary.shape
+        lower, kind = level.lower, self.kinds[fixed]
+        same = fixed * nodes + lower.owner
+        saved = np.asarray(np.bincount(same, lower.change, labels * nodes), np.float64)
+        saved = saved.reshape(labels, nodes)
+        of_kind = np.bincount(kind * nodes + lower.owner, lower.of_kind, 2 * nodes).reshape(2, nodes)
+        saved[: self.split] += of_kind[0]
+        saved[self.split :] += of_kind[1]
+        return saved

@@ -7,6 +7,7 @@ Fundamental matrices of frame pairs test less: they do not see a point that slid
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -45,6 +46,9 @@ PARALLAX_CELLS, PARALLAX_SHARE = 12, 0.12
 which there are points, of so many along the longer side: depth shows in many places, a thing that moves in
 one. More finds larger things before a standing camera, and takes more of a scene with little parallax for
 movers."""
+KEEPS_ITS_PLACE, LITTLE = 2.0, 0.25
+"""Pixels of a 640x480 picture within which a point stays that keeps its place in it, and the share of those
+cells below which such points are fixed to the camera. Where more of the picture rests, the camera does."""
 FINALISTS, FINAL_STEPS = 3, 8
 """Starts that are followed to their end, and the steps of each: of two, both are sometimes wrong."""
 LAST_STEPS = 3
@@ -221,12 +225,15 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     place = np.nan_to_num(observed[nearest, columns])
     cell = np.floor((place + 0.5) * 16).astype(int) @ [1, 1000]
     _, inverse, count = np.unique(cell, return_inverse=True, return_counts=True)
-    weight = np.where(good, 1 / np.sqrt(count[inverse]), 0.0)  # dense texture does not outvote the rest
+    told = good & ~_fixed_to_camera(observed, seen & good, place, unit)
+    if told.sum() < LEAST_POINTS:
+        told = good
+    weight = np.where(told, 1 / np.sqrt(count[inverse]), 0.0)  # dense texture does not outvote the rest
     bundle = Bundle(
         observed.transpose(0, 2, 1), seen & good, weight, tolerance, reference, LENS_PRIOR, LENS_SPREAD
     )
 
-    picked = _thin(seen, cell, good, rng)
+    picked = _thin(seen, cell, told, rng)
     time = (frames - frames[reference]) / max(frames[-1] - frames[0], 1)
     X = np.column_stack([place / np.exp(LENS_PRIOR[0]), np.zeros(tracks.points)])
     few = bundle.subset(picked)
@@ -238,10 +245,35 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     return World(frames, bundle, bundle.solve_points(estimate, 3), side, has_moved).above_road()
 
 
-def _thin(seen: Bools, cell: NDArray[np.int64], good: Bools, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Long-lived points, at most three a cell of the picture."""
+def _fixed_to_camera(observed: Array, seen: Bools, place: Array, unit: float) -> Bools:
+    """Points (P,) that keep their place in a picture that moves: on the bonnet, in the glass, in a burnt-in
+    time.
+
+    They would tell of a camera that stands, before which all else moves by itself, and few of a window's
+    tracks last as long as they do.
+    """
+    low, high = (
+        least(np.where(seen[..., None], observed, none), axis=0)
+        for least, none in ((np.min, np.inf), (np.max, -np.inf))
+    )
+    known = np.asarray(seen.any(axis=0), bool)
+    keep = known & (
+        np.linalg.norm(np.where(known[:, None], high - low, 0.0), axis=1) <= KEEPS_ITS_PLACE * unit
+    )
+    cell = _cells(place)
+    few = len(np.unique(cell[keep])) < LITTLE * len(np.unique(cell[known]))
+    return np.asarray(keep & few, bool)
+
+
+def _cells(place: Array) -> NDArray[np.int64]:
+    """Which of the cells of the picture (P,) points (P, 2) lie in."""
+    return np.asarray(np.floor((place + 0.5) * PARALLAX_CELLS).astype(np.int64) @ [1, 100])
+
+
+def _thin(seen: Bools, cell: NDArray[np.int64], told: Bools, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Long-lived points of those that are told, at most three a cell of the picture."""
     order = np.argsort(-seen.sum(axis=0) - rng.random(seen.shape[1]) / 2)
-    order = order[good[order]]
+    order = order[told[order]]
     rank = np.zeros(len(order), dtype=int)
     taken: dict[int, int] = {}
     for k, point in enumerate(order):
@@ -275,7 +307,7 @@ def _has_moved(bundle: Bundle, moved: Estimate, far: Estimate) -> bool:
     still = bundle.rms(bundle.residual(far)) < 2 * bundle.tolerance
     counted = bundle.weight > 0
     place = bundle.observed[..., counted].sum(axis=0) / bundle.seen[:, counted].sum(axis=0)
-    cell = np.array([1, 100]) @ np.floor((place + 0.5) * PARALLAX_CELLS).astype(int)
+    cell = _cells(place.T)
     needing = np.unique(cell[(near & ~still)[counted]])
     return len(needing) >= PARALLAX_SHARE * len(np.unique(cell))
 
@@ -285,10 +317,10 @@ def _set_off(bundle: Bundle, turned: Estimate, frames: NDArray[np.int64]) -> Est
     first."""
     time = (frames - frames[bundle.reference]) / max(frames[-1] - frames[0], 1)
     X = np.column_stack([turned.X[:, :2], np.full(len(turned.X), SLIGHT)])
-    found = [
-        bundle.solve(replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=X), SET_OFF)
-        for direction in STARTS
+    starts = [
+        replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=X) for direction in STARTS
     ]
+    found = bundle.solve_each(starts, SET_OFF)
     return min(found, key=lambda estimate: _typical(bundle, estimate))
 
 
@@ -308,13 +340,16 @@ def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estima
     near = X.copy()
     near[:, :2] = turned.X[:, :2]
     near[:, 2] = 0.03  # 30 times the camera's way: far enough for any first step
-    found: list[tuple[float, int, Estimate]] = []
-    for direction in STARTS:
-        t = 2 * time[:, None] * np.array(direction, dtype=float)
-        estimate = bundle.solve(replace(turned, t=t, X=near), FALLING)
-        found.append((bundle.cost(bundle.residual(estimate), 1.0), len(found), estimate))
-    finished = []
-    for _, k, estimate in sorted(found, key=lambda item: item[:2])[:FINALISTS]:
-        better = bundle.solve(estimate, [2.0] + [1.0] * (FINAL_STEPS - 1))
-        finished.append((bundle.cost(bundle.residual(better), 1.0), k, better))
-    return min(finished, key=lambda item: item[:2])[2], turned
+    starts = [
+        replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=near)
+        for direction in STARTS
+    ]
+    found = bundle.solve_each(starts, FALLING)
+    best = np.sort(np.argsort(_costs(bundle, found), kind="stable")[:FINALISTS])
+    finished = bundle.solve_each([found[k] for k in best], [2.0] + [1.0] * (FINAL_STEPS - 1))
+    return finished[int(np.argmin(_costs(bundle, finished)))], turned
+
+
+def _costs(bundle: Bundle, found: Sequence[Estimate]) -> Array:
+    """How badly each of some estimates fits."""
+    return np.array([bundle.cost(bundle.residual(estimate), 1.0) for estimate in found])
