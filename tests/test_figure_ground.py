@@ -51,10 +51,16 @@ class Clip:
         return self.points.ids[rows[np.argsort(away[rows])]]
 
     def corrected(
-        self, fps: float | None = None, labels: np.ndarray | None = None, guessed: np.ndarray | None = None
+        self,
+        fps: float | None = None,
+        labels: np.ndarray | None = None,
+        guessed: np.ndarray | None = None,
+        joined: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Labels of all rows after the check; all is decided unless ``guessed`` (T,) names tracks."""
+        """Labels of all rows after the check; all is decided unless ``guessed`` (T,) names tracks. ``joined``
+        (T,) have lain on the object before."""
         check = FigureGround(fps=fps)
+        check._votes.update({(track, 1): 5 for track in ([] if joined is None else joined.tolist())})
         labels = self.labels() if labels is None else labels
         short = np.isin(self.points.ids, [] if guessed is None else guessed)
         for frame, grey in enumerate(self.greys):
@@ -206,6 +212,18 @@ def test_what_passes_close_by_is_followed_by_its_short_tracks() -> None:
     assert (corrected[brief] == 1).mean() > 0.95
     assert (corrected[brief & (frame > 20)] == 1).mean() > 0.95
     assert not corrected[~brief & ~np.isin(reborn.ids, corner)].any()
+
+
+def test_what_joined_leaves_where_it_lies_far_from_the_rest() -> None:
+    """A thing does not fall apart."""
+    clip = sliding_square()
+    far = clip.ground_beside_the_square()[-8:]
+    on_it = clip.on_object[::3]
+    guessed = np.concatenate([far, on_it])
+    labels = np.where(np.isin(clip.points.ids, on_it), 0, clip.labels())
+    corrected = clip.corrected(labels=labels, guessed=guessed, joined=guessed)
+    assert not corrected[np.isin(clip.points.ids, far)].any()
+    assert corrected[np.isin(clip.points.ids, on_it)].all()
 
 
 def test_a_track_that_has_ended_is_forgotten() -> None:

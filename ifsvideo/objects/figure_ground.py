@@ -35,6 +35,9 @@ _ACCELERATION = 0.7
 _GROWTH, _MARGIN = 0.1, 10.0
 """How far beyond its tracks an object may reach, share of their box and pixels. With half of the box false
 objects spread over what moves nearly alike."""
+_FEW, _ASTRAY = 3, 1.0
+"""Labelled tracks of an object from which on they alone tell where it is, and how far beyond their view the
+tracks that joined it may lie, share of the view: a thing does not fall apart."""
 _SMALLEST = 8
 """Least side of a view, pixels: in a smaller one there is no outline."""
 _TOUCHED, _GROWN = 0.1, 0.4
@@ -272,7 +275,12 @@ class FigureGround:
     def _look_at(self, here: _Seen, number: int, own: Bools, place: int) -> None:
         """Find the silhouette of an object in a frame, where its own tracks (N,) are known, and count the
         votes of the tracks round it."""
-        xy = here.xy
+        xy, labelled = here.xy, here.labels == number
+        told = labelled if np.count_nonzero(labelled) >= _FEW else own
+        astray = own & ~View.around(xy[told], _GROWTH, _MARGIN, here.size).contains(xy, _ASTRAY)
+        for track in here.points.ids[astray].tolist():
+            self._votes[track, number] = min(self._votes[track, number], 0) - 1
+        own = own & ~astray
         seen = self._find(here, own, place, View.around(xy[own], _GROWTH, _MARGIN, here.size))
         if seen is None:
             return
@@ -281,7 +289,6 @@ class FigureGround:
             seen = self._find(here, own, place, wider) or seen
         rows = np.flatnonzero(seen.view.contains(xy))
         on = _lies_on(seen.silhouette, seen.view, xy[rows])
-        labelled = here.labels == number
         held = on[(labelled & ~here.guessed)[rows]]
         if np.count_nonzero(held) < _HELD * len(held):
             return
