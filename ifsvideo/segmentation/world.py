@@ -46,9 +46,10 @@ PARALLAX_CELLS, PARALLAX_SHARE = 12, 0.12
 which there are points, of so many along the longer side: depth shows in many places, a thing that moves in
 one. More finds larger things before a standing camera, and takes more of a scene with little parallax for
 movers."""
-KEEPS_ITS_PLACE, LITTLE = 2.0, 0.25
-"""Pixels of a 640x480 picture within which a point stays that keeps its place in it, and the share of those
-cells below which such points are fixed to the camera. Where more of the picture rests, the camera does."""
+KEEPS_ITS_PLACE, LITTLE, FOOT = 2.0, 0.25, 0.25
+"""Pixels of a 640x480 picture within which a point stays that keeps its place in it; the share of those cells
+from which on the camera rests if that many of them do; and how far below the middle of the picture, in
+heights of it, what is fixed to the camera is looked for: higher up what is far away keeps its place, too."""
 FINALISTS, FINAL_STEPS = 3, 8
 """Starts that are followed to their end, and the steps of each: of two, both are sometimes wrong."""
 LAST_STEPS = 3
@@ -225,7 +226,8 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     place = np.nan_to_num(observed[nearest, columns])
     cell = np.floor((place + 0.5) * 16).astype(int) @ [1, 1000]
     _, inverse, count = np.unique(cell, return_inverse=True, return_counts=True)
-    told = good & ~_fixed_to_camera(observed, seen & good, place, unit)
+    at_the_foot = place[:, 1] > FOOT * size[1] / side
+    told = good & ~(_keeps_its_place(observed, seen & good, place, unit) & at_the_foot)
     if told.sum() < LEAST_POINTS:
         told = good
     weight = np.where(told, 1 / np.sqrt(count[inverse]), 0.0)  # dense texture does not outvote the rest
@@ -245,10 +247,10 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     return World(frames, bundle, bundle.solve_points(estimate, 3), side, has_moved).above_road()
 
 
-def _fixed_to_camera(observed: Array, seen: Bools, place: Array, unit: float) -> Bools:
-    """Points (P,) that keep their place in a picture that moves: on the bonnet, in the glass, in a burnt-in
-    time.
+def _keeps_its_place(observed: Array, seen: Bools, place: Array, unit: float) -> Bools:
+    """Points (P,) that rest in a picture that moves.
 
+    At its foot, where the ground is near, they are fixed to the camera: on the bonnet, or in a burnt-in time.
     They would tell of a camera that stands, before which all else moves by itself, and few of a window's
     tracks last as long as they do.
     """
