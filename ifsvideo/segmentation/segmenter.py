@@ -21,7 +21,7 @@ from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
 from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
-from ifsvideo.segmentation.smoothing import smoothed
+from ifsvideo.segmentation.smoothing import filled, smoothed
 from ifsvideo.segmentation.static_core import in_static_core
 from ifsvideo.segmentation.voting import voted
 from ifsvideo.segmentation.whole import Whole
@@ -36,7 +36,7 @@ class _Prepared:
     Attributes
     ----------
     measured : Tracks
-        Without the lens's bend.
+        Without the lens's bend and the short gaps.
     tracks : Tracks
         Without their noise, too.
     size : (width, height) of the picture, pixels
@@ -115,7 +115,8 @@ class IFSSegmenter:
         if config.distortion:
             tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
         unit = float(np.hypot(*size)) / 800
-        measured, tracks = tracks, smoothed(tracks, config.smoothing, unit)
+        measured = filled(tracks)
+        tracks = smoothed(measured, config.smoothing, unit)
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))
