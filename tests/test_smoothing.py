@@ -10,7 +10,7 @@ import pytest
 from ifsvideo.benchmark.perturb import Perturbation
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.segmenter import IFSSegmenter
-from ifsvideo.segmentation.smoothing import filled, noise_of, smoothed, without_gaps
+from ifsvideo.segmentation.smoothing import filled, noise_of, noisy, smoothed, without_gaps
 from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, Camera, Scene, make_scene, share_wrong
 
@@ -53,6 +53,13 @@ def test_what_no_other_track_shares_goes_however_it_changes(drop: float, left: f
     assert np.array_equal(found.visible, given.visible)
     before, after = (np.sqrt(np.nanmean((xy - true) ** 2)) for xy in (given.xy, found.xy))
     assert after < left * before
+
+
+def test_noise_is_told_in_pixels_of_a_small_picture() -> None:
+    tracks = scene_of(1.0).tracks
+    assert noisy(tracks, 1.0)
+    assert not noisy(tracks, 8.0)
+    assert not noisy(scene_of(0.1).tracks, 1.0)
 
 
 def test_gaps_stay_gaps_and_short_tracks_are_left() -> None:

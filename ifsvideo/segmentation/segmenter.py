@@ -21,7 +21,7 @@ from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
 from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
-from ifsvideo.segmentation.smoothing import filled, smoothed
+from ifsvideo.segmentation.smoothing import filled, noisy, smoothed
 from ifsvideo.segmentation.static_core import in_static_core
 from ifsvideo.segmentation.voting import voted
 from ifsvideo.segmentation.whole import Whole
@@ -102,7 +102,7 @@ class IFSSegmenter:
             def stages() -> Segmentation:
                 return self._stages(prepared, motions, rng)
 
-            whole = Whole(prepared.measured) if self.alone else None
+            whole = Whole(prepared.measured, noisy(prepared.measured, prepared.unit)) if self.alone else None
             part = stages() if whole is None else voted(stages, self.config.votes, whole, motions)
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence

@@ -52,6 +52,11 @@ def noise_of(tracks: Tracks) -> float:
     return float(_SIGMA * np.median(np.abs(known)) / _THIRD) if len(known) else 0.0
 
 
+def noisy(tracks: Tracks, unit: float) -> bool:
+    """Whether tracks have more noise than they may have and stay as they are; unit as of `smoothed`."""
+    return noise_of(tracks) > CLEAN * unit
+
+
 def smoothed(tracks: Tracks, strength: float, unit: float) -> Tracks:
     """Tracks without their noise, where they have much.
 
