@@ -257,6 +257,28 @@ def test_what_its_votes_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert whole.misfit(scene.truth) == pytest.approx(Whole(scene.tracks).misfit(scene.truth))
 
 
+@pytest.mark.parametrize(("noise", "noisy"), [(0.1, False), (1.0, True)])
+def test_the_whole_is_told_of_noise_and_short_gaps_are_none(
+    noise: float, noisy: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Tracks, bool]] = []
+
+    def whole(tracks: Tracks, noisy: bool) -> Whole:
+        asked.append((tracks, noisy))
+        return Whole(tracks, noisy)
+
+    monkeypatch.setattr("ifsvideo.segmentation.segmenter.Whole", whole)
+    tracks = make_scene(Camera.path(), (LEFT_CAR,), noise=noise).tracks
+    visible = tracks.visible.copy()
+    visible[5:7, ::2] = False
+    gaps = Tracks.from_array(np.where(visible[..., None], tracks.xy, np.nan), size=tracks.size)
+    IFSSegmenter(alone=True).segment(gaps)
+    ((given, told),) = asked
+    assert told == noisy
+    assert np.array_equal(given.visible, tracks.visible)
+    assert np.array_equal(given.xy[visible], tracks.xy[visible])
+
+
 def test_parts_of_the_ground_that_a_cut_has_as_one_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stage 5 is made to leave the ground in two parts, of which it is not sure."""
     scene = make_scene(movers=(LEFT_CAR,))

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ifsvideo.benchmark.perturb import Perturbation
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.segmenter import IFSSegmenter
-from ifsvideo.segmentation.smoothing import noise_of, smoothed, without_gaps
+from ifsvideo.segmentation.smoothing import filled, noise_of, noisy, smoothed, without_gaps
 from ifsvideo.types import Tracks
 from tests.scenes import LEFT_CAR, RIGHT_CAR, Camera, Scene, make_scene, share_wrong
 
@@ -43,6 +44,24 @@ def test_noisy_tracks_come_nearer_to_the_truth(noise: float) -> None:
     assert after < 0.6 * before
 
 
+@pytest.mark.parametrize(("drop", "left"), [(0.0, 0.5), (0.2, 0.6)])
+def test_what_no_other_track_shares_goes_however_it_changes(drop: float, left: float) -> None:
+    """Before anything is made smooth in time: with next to no strength."""
+    true = scene_of(0.0).tracks.xy
+    given = Perturbation(drop=drop).apply(scene_of(1.0).tracks, 0)
+    found = smoothed(given, 1e-9, 1.0)
+    assert np.array_equal(found.visible, given.visible)
+    before, after = (np.sqrt(np.nanmean((xy - true) ** 2)) for xy in (given.xy, found.xy))
+    assert after < left * before
+
+
+def test_noise_is_told_in_pixels_of_a_small_picture() -> None:
+    tracks = scene_of(1.0).tracks
+    assert noisy(tracks, 1.0)
+    assert not noisy(tracks, 8.0)
+    assert not noisy(scene_of(0.1).tracks, 1.0)
+
+
 def test_gaps_stay_gaps_and_short_tracks_are_left() -> None:
     tracks = scene_of(1.0).with_gaps().tracks
     visible = tracks.visible.copy()
@@ -67,6 +86,27 @@ def test_cars_are_found_among_noise_in_which_they_drown_otherwise() -> None:
         scenes = [scene_of(1.5, seed=seed) for seed in range(4)]
         wrong[strength] = np.mean([share_wrong(segmenter.segment(s.tracks).labels, s.truth) for s in scenes])
     assert wrong[STRENGTH] < 0.5 * wrong[0.0]
+
+
+@pytest.mark.parametrize(("shake", "most"), [(0.0, 0.02), (0.005, 0.5)])
+def test_short_gaps_inside_a_life_are_filled_nearly_exactly(shake: float, most: float) -> None:
+    tracks = scene_of(0.0, shake).tracks
+    visible = tracks.visible.copy()
+    visible[10:13, 4] = visible[5, 4] = False
+    visible[:2, 5] = visible[-2:, 6] = visible[10:14, 7] = False  # ends, and a gap that is too long
+    visible[4:, 8] = visible[1, 8] = False  # too few frames for a curve
+    given = replace(tracks, visible=visible, xy=np.where(visible[..., None], tracks.xy, np.nan))
+    found = filled(given)
+    expected = visible.copy()
+    expected[10:13, 4] = expected[5, 4] = True
+    assert np.array_equal(found.visible, expected)
+    assert np.array_equal(np.isfinite(found.xy).all(axis=2), expected)
+    assert np.array_equal(found.xy[visible], tracks.xy[visible])
+    straight = without_gaps(given).xy
+    gap = np.flatnonzero(expected[:, 4] & ~visible[:, 4])
+    error, other = (np.abs(xy[gap, 4] - tracks.xy[gap, 4]).max() for xy in (found.xy, straight))
+    assert error < min(most, other)
+    assert filled(tracks) is tracks
 
 
 def test_gaps_are_filled_beside_the_common_path() -> None:

@@ -26,6 +26,7 @@ class Cuts:
         self.cuts = {len(set(labels)): np.array(labels, dtype=np.int64) for labels in cuts}
         self.uncertainty = uncertainty or {}
         self.affine: list[int] | None = None
+        self.noisy = False
         self.asked: list[int] = []
 
     def cut(self, motions: int) -> Cut | None:
@@ -156,6 +157,17 @@ def test_two_parts_that_a_cut_has_as_one_are_one_unless_surely_apart(
     apart: float, fewer: float, joined: bool
 ) -> None:
     whole = Cuts(TWO, THREE, uncertainty={2: fewer})
+    assert chosen(runs(THREE, apart=apart), 5, whole) == (TWO if joined else THREE)
+
+
+@pytest.mark.parametrize(
+    ("apart", "fewer", "joined"), [(0.4, 1.0, True), (0.6, 1.0, False), (0.6, 0.5, True), (0.4, 2.0, False)]
+)
+def test_in_noise_two_parts_are_one_only_where_that_is_likelier(
+    apart: float, fewer: float, joined: bool
+) -> None:
+    whole = Cuts(TWO, THREE, uncertainty={2: fewer})
+    whole.noisy = True
     assert chosen(runs(THREE, apart=apart), 5, whole) == (TWO if joined else THREE)
 
 

@@ -19,10 +19,10 @@ class SegmenterConfig:
     distortion: float = 0.0
     """k1 of the lens, taken out of the tracks before anything else (`ifsvideo.lens` has the model): above
     -4/27, negative for a wide lens. By default the lens bends nothing."""
-    smoothing: float = 10_000.0
-    """How much noisy tracks are smoothed (`ifsvideo.segmentation.smoothing`): not at all below a quarter of a
-    pixel of noise; at one pixel this holds back what changes within 30 frames. 0, the thesis's, smoothes
-    none."""
+    smoothing: float = 1.0
+    """How much noisy tracks are smoothed, once cleared of what they do not share with others
+    (`ifsvideo.segmentation.smoothing`): not at all below a quarter of a pixel of noise; at one pixel this
+    holds back what changes within six frames. 0, the thesis's, leaves tracks as they are."""
     lasting: float = 0.75
     """Share of a sequence's frames in which the typical track must be seen for them to be one window; where
     tracks are shorter, the sequence is cut into windows (`ifsvideo.segmenting`). 0, the thesis's: always one.

@@ -21,7 +21,7 @@ from ifsvideo.segmentation.refinement import data_term, delaunay_edges, refine
 from ifsvideo.segmentation.sampling import sample_models
 from ifsvideo.segmentation.selection import needed_models
 from ifsvideo.segmentation.similarity import learnt
-from ifsvideo.segmentation.smoothing import smoothed
+from ifsvideo.segmentation.smoothing import filled, noisy, smoothed
 from ifsvideo.segmentation.static_core import in_static_core
 from ifsvideo.segmentation.voting import voted
 from ifsvideo.segmentation.whole import Whole
@@ -36,7 +36,7 @@ class _Prepared:
     Attributes
     ----------
     measured : Tracks
-        Without the lens's bend.
+        Without the lens's bend and the short gaps.
     tracks : Tracks
         Without their noise, too.
     size : (width, height) of the picture, pixels
@@ -102,7 +102,7 @@ class IFSSegmenter:
             def stages() -> Segmentation:
                 return self._stages(prepared, motions, rng)
 
-            whole = Whole(prepared.measured) if self.alone else None
+            whole = Whole(prepared.measured, noisy(prepared.measured, prepared.unit)) if self.alone else None
             part = stages() if whole is None else voted(stages, self.config.votes, whole, motions)
             labels[usable], background[usable] = part.labels, part.background
             segments[usable], confidence[usable] = part.segments, part.confidence
@@ -115,7 +115,8 @@ class IFSSegmenter:
         if config.distortion:
             tracks = replace(tracks, xy=undistort(tracks.xy, size, config.distortion))
         unit = float(np.hypot(*size)) / 800
-        measured, tracks = tracks, smoothed(tracks, config.smoothing, unit)
+        measured = filled(tracks)
+        tracks = smoothed(measured, config.smoothing, unit)
         # With complete tracks the first frame, as in the thesis.
         base = int(np.argmax(tracks.visible.sum(axis=1)))
         anchor = np.where(tracks.visible[base, :, None], tracks.xy[base], np.nanmean(tracks.xy, axis=0))

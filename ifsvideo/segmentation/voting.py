@@ -117,7 +117,8 @@ def _with_one_ground(found: Segmentation, whole: Whole) -> Segmentation:
     while all others are the same, are one unless they are surely apart.
 
     How sure the segmentation is of that is weighed with how sure the cuts are: the odds that the two are
-    apart times how much less certain the cut into fewer is.
+    apart times how much less certain the cut into fewer is. In noise even odds suffice: it hides what parts
+    two motions from the cut into fewer, and the ground is in two parts less often.
     """
     groups = np.unique(found.labels).tolist()
     fewer, same = whole.cut(len(groups) - 1), whole.cut(len(groups))
@@ -128,7 +129,8 @@ def _with_one_ground(found: Segmentation, whole: Whole) -> Segmentation:
     if not _alike(joined[pair], fewer.labels):
         return found
     odds = logit(found.details["apart"][pair]) + np.log(fewer.uncertainty / same.uncertainty)
-    return found if odds > logit(1 - _SURE) else _with_one_ground(_joined(found, *pair), whole)
+    surely = logit(0.5 if whole.noisy else 1 - _SURE)
+    return found if odds > surely else _with_one_ground(_joined(found, *pair), whole)
 
 
 def _joined(found: Segmentation, first: int, second: int) -> Segmentation:

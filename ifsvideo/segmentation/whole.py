@@ -31,10 +31,12 @@ class Whole:
     tracks : Tracks
         As they were measured: the cut bears noise better than what smoothing does to them. Their gaps are
         filled in time for it; what fits is told by what was measured alone.
+    noisy : bool
+        Whether they have so much noise that the cuts blur.
     """
 
-    def __init__(self, tracks: Tracks) -> None:
-        self._tracks = tracks
+    def __init__(self, tracks: Tracks, noisy: bool = False) -> None:
+        self._tracks, self.noisy = tracks, noisy
         self._W, self._seen = trajectory_matrix(tracks, _KEY_FRAMES)
         self._interaction: ShapeInteraction | None = None
         self._cuts: dict[int, Cut] = {}
