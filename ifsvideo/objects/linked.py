@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from ifsvideo.objects.windows import Bounds
 from ifsvideo.types import BACKGROUND, UNDECIDED, Bools
 
+_LEAST_AGREED = 20
+"""Tracks of which two windows must agree to deny the one between."""
+
 
 @dataclass(frozen=True)
 class LinkedWindow:
@@ -32,7 +35,10 @@ class LinkedWindow:
     decided: Bools
 
     def say_of(
-        self, ids: NDArray[np.int64], before: LinkedWindow | None, after: LinkedWindow | None
+        self,
+        ids: NDArray[np.int64],
+        before: LinkedWindow | None = None,
+        after: LinkedWindow | None = None,
     ) -> tuple[NDArray[np.int64], Bools]:
         """Labels of points (N,) by their tracks (N,), and whether these are but guessed.
 
@@ -42,12 +48,21 @@ class LinkedWindow:
         """
         labels, decided = self._find(ids)
         if before is not None and after is not None:
-            first, was_decided = before._find(ids)
-            second, is_decided = after._find(ids)
-            agreed = (first == second) & (first != UNDECIDED) & was_decided & is_decided
+            agreed, first = _agreed(ids, before, after)
             outvoted = agreed & ((first > BACKGROUND) != (labels > BACKGROUND))
             labels = np.where(outvoted, first, labels)
         return labels, ~decided
+
+    def is_denied_by(self, before: LinkedWindow, after: LinkedWindow) -> bool:
+        """Whether the windows before and after, where they agree, mostly say otherwise than this one.
+
+        Such a window took a large object for the world, and the world for objects.
+        """
+        agreed, first = _agreed(self.ids, before, after)
+        agreed &= self.decided
+        wrong = agreed & ((first > BACKGROUND) != (self.labels > BACKGROUND))
+        count = np.count_nonzero(agreed)
+        return bool(count >= _LEAST_AGREED and 2 * np.count_nonzero(wrong) > count)
 
     def _find(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools]:
         """Labels (N,) of tracks, -1 of those that the window has not, and whether it has decided of them."""
@@ -56,3 +71,12 @@ class LinkedWindow:
         labels, decided = np.full(len(ids), UNDECIDED, dtype=np.int64), np.zeros(len(ids), dtype=bool)
         labels[known], decided[known] = self.labels[place], self.decided[place]
         return labels, decided
+
+
+def _agreed(
+    ids: NDArray[np.int64], before: LinkedWindow, after: LinkedWindow
+) -> tuple[Bools, NDArray[np.int64]]:
+    """Of which tracks (N,) two windows have decided, and alike, and what (N,)."""
+    first, was_decided = before._find(ids)
+    second, is_decided = after._find(ids)
+    return (first == second) & (first != UNDECIDED) & was_decided & is_decided, first

@@ -21,6 +21,8 @@ class Linker:
     A track belongs to the object to which most windows gave it. Each label of a window takes the number with
     which it shares most tracks, one to one, so that most tracks in all keep theirs:
 
+    - Only tracks of which windows could decide count at first; what shares too few of these with any takes
+      the number with which it shares most of all tracks, if most of that one's still move.
     - Birth: a label that shares too few tracks is a new object, or one that was lost a moment ago, if place
       and motion agree (`ifsvideo.objects.reappearance`).
     - Death: an object that no window finds for ``longest_loss`` frames does not come back; its number is
@@ -104,10 +106,13 @@ class Linker:
             Frames of the clip from one of the window's to the next.
         """
         here = [int(label) for label in np.unique(labels) if label > BACKGROUND]
-        known = [self.number_of(i) or 0 if i in self._given else 0 for i in tracks.ids.tolist()]
-        numbers = np.array(known, dtype=np.int64)
+        every = np.array([self.number_of(i) or 0 for i in tracks.ids.tolist()], dtype=np.int64)
+        numbers = np.where(np.isin(tracks.ids, self.movers()), every, 0)
         sure = np.ones(len(labels), bool) if decided is None else decided
         number_for = self._by_shared_tracks(here, labels[sure], numbers[sure])
+        others = [label for label in here if label not in number_for]
+        every[np.isin(every, list(number_for.values()))] = 0
+        number_for |= self._by_shared_tracks(others, labels, _moving(every, labels))
         sights = {label: Sight.of(tracks, labels == label, start, stride) for label in here}
         unknown = {label: sights[label] for label in here if label not in number_for}
         taken = number_for.values()
@@ -174,3 +179,13 @@ class Linker:
         certain = np.isin(numbers, held)
         _, nearest = cKDTree(place[members[certain]]).query(place[members])
         linked[members] = numbers[certain][nearest]
+
+
+def _moving(numbers: NDArray[np.int64], labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The numbers (P,) of those objects of whose tracks a window calls at least half moving, else 0."""
+    result = numbers.copy()
+    for number in np.unique(numbers[numbers > 0]).tolist():
+        said = labels[(numbers == number) & (labels >= BACKGROUND)]
+        if 2 * np.count_nonzero(said > BACKGROUND) < len(said):
+            result[numbers == number] = 0
+    return result

@@ -96,7 +96,7 @@ class Motions:
         if np.count_nonzero(seen) < _LEAST_POINTS or np.count_nonzero(seen_ground) < _LEAST_GROUND:
             return None
         asked = self._xy[self._ground[self._asked]]
-        flow = _affine(self._xy[self._own[seen]], own[seen], np.concatenate([self._nodes, asked]))
+        flow = affine(self._xy[self._own[seen]], own[seen], np.concatenate([self._nodes, asked]))
         with_object, as_object = np.split(flow, [len(self._nodes)])
         if len(asked):
             guess, as_ground = ground[self._asked], _median(ground[self._sure_near], _NEIGHBOURS)
@@ -121,7 +121,7 @@ def lags(rate: float, seconds: Iterable[float]) -> tuple[int, ...]:
     return tuple(sorted({max(1, round(one * rate)) for one in seconds}))
 
 
-def _affine(xy: NDArray[np.float32], step: Array, nodes: NDArray[np.float32]) -> Array:
+def affine(xy: NDArray[np.float32], step: Array, nodes: NDArray[np.float32]) -> Array:
     """Steps (M, 2) of nodes by the affine motion of most of the tracks (N, 2), that which is linear in their
     place held back a little; by the median step where there are few tracks."""
     usual = middle(step)

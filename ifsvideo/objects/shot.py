@@ -200,12 +200,17 @@ class Shot:
         start = self._blocks[-1] if self._blocks else self._gone
         self._blocks.append(stop)
         block = self._frames[start - self._gone : stop - self._gone]
-        movers = self._linker.movers()
-        for frame in block:
+        movers, before = self._linker.movers(), self._before
+        denied = before is not None and after is not None and window.is_denied_by(before, after)
+        for place, frame in enumerate(block, start):
             ids = frame.points.ids
-            frame.labels, frame.guessed = window.say_of(ids, self._before, after)
+            if denied and before is not None and after is not None:
+                nearest = before if 2 * place < before.bounds[1] + after.bounds[0] else after
+                frame.labels, frame.guessed = nearest.say_of(ids)
+            else:
+                frame.labels, frame.guessed = window.say_of(ids, before, after)
             frame.guessed |= (frame.labels == BACKGROUND) & np.isin(ids, movers)
-        self._before = window
+        self._before = None if denied else window
         if not self._config.check_borders:
             return
         labels, corrected = self._labels_now(block), self._labels_now(block, corrected=True)

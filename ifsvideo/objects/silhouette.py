@@ -19,13 +19,16 @@ from numpy.typing import NDArray
 
 from ifsvideo.types import Bools, Image
 
-_PIXELS = 7500
-"""Most pixels of a view; a larger box is looked at in fewer. With 4000 outlines are less exact, with 20000
-little more exact and three times as slow (`ifsvideo/benchmark/TRIED.md`)."""
+_PIXELS = 12000
+"""Most pixels of a view; a larger box is looked at in fewer. With 7500 outlines are less exact, with 20000
+no more exact, and slower (`ifsvideo/benchmark/TRIED.md`)."""
 _BLUR = 0.7
 """Standard deviation of the smoothing, pixels of the view: takes out noise and the error of sampling between
 pixels."""
-_NOISE = 1.5
+_SHADE = 0.5
+"""Share of the view over which brightness may differ smoothly without counting: a shadow that goes along with
+the object is ground that has become darker."""
+_NOISE = 2.0
 """Misfit, grey levels, that noise alone leaves; added to both, so that two small ones count as equal."""
 _SURE = 0.9
 """Logarithm of the ratio of misfits from which on a pixel is told: one fits 2.5 times better."""
@@ -199,7 +202,8 @@ def _smooth(grey: Image) -> Image:
 
 def _misfits(view: View, here: Image, other: Parted) -> NDArray[np.float32]:
     """Misfit (2, rows, columns), grey levels, of each pixel to what another frame shows where the object, and
-    where the ground would have carried it; infinite where one of these is outside the picture."""
+    where the ground would have carried it, but for a smooth change of brightness; infinite where one of these
+    is outside the picture."""
     height, width = other.grey.shape
     farthest = max(float(np.abs(flow).max()) for flow in (other.with_object, other.with_ground))
     there, first = view.cut(other.grey, int(min(farthest, max(height, width))) + 2)
@@ -208,6 +212,7 @@ def _misfits(view: View, here: Image, other: Parted) -> NDArray[np.float32]:
     corner = (np.array([view.left, view.top], np.float32) + 0.5) * scale - 0.5
     last = (np.array([width, height], np.float32) - 0.5) * scale - 0.5
     column, row = np.arange(view.columns, dtype=np.float32), np.arange(view.rows, dtype=np.float32)[:, None]
+    shade = (max(1, round(_SHADE * view.columns)), max(1, round(_SHADE * view.rows)))
     outside = np.zeros(here.shape, bool)
     misfits = np.empty((2, *here.shape), np.float32)
     for flow, misfit in zip((other.with_object, other.with_ground), misfits, strict=True):
@@ -219,7 +224,9 @@ def _misfits(view: View, here: Image, other: Parted) -> NDArray[np.float32]:
         shown = cv2.remap(
             there, x + first[0], y + first[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
-        cv2.blur(cv2.absdiff(shown, here).astype(np.float32), _BESIDE.shape, dst=misfit)
+        difference = cv2.subtract(shown, here, dtype=cv2.CV_32F)
+        cv2.absdiff(difference, cv2.blur(difference, shade), dst=difference)
+        cv2.blur(difference, _BESIDE.shape, dst=misfit)
     if outside.any():
         misfits[:, outside] = np.inf
     return misfits

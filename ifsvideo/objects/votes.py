@@ -1,0 +1,91 @@
+"""Looks vote whether a track lies on an object."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifsvideo.types import BACKGROUND, Bools, Ints
+
+_LEAVES, _SURE_LEAVES = 1, 2
+"""Looks by which a track must have lain beside its object more often than on it: one that is guessed to be
+the object's, and one of which a window has decided."""
+_JOINS, _SURE_JOINS = 1, 2
+"""Looks by which a track of the background must have lain on an object more often than beside it: one that is
+guessed to be background, and one of which a window has decided."""
+_SLOW = 20.0
+"""Frames a second below which it takes one look more to leave: pictures that are a tenth of a second apart
+differ by more than two motions. Without this a fiftieth of what moves in KT3DMoSeg goes to the background."""
+
+
+class Votes:
+    """Of each track and object: looks in which the track lay there, less those in which it did not.
+
+    Parameters
+    ----------
+    fps : float
+        Frames a second.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self._patience = int(fps < _SLOW)
+        self._votes: dict[int, Counter[int]] = {}
+        self._decided: set[int] = set()
+
+    def decide(self, tracks: NDArray[np.int64]) -> None:
+        """Some tracks (T,) have been decided by a window to be an object's: they do not leave so easily."""
+        self._decided.update(tracks.tolist())
+
+    def cast(self, tracks: NDArray[np.int64], number: int, lies_there: Bools) -> None:
+        """Count one look at an object: whether each of some tracks (T,) lies on it (T,)."""
+        for track, lies in zip(tracks.tolist(), lies_there.tolist(), strict=True):
+            self._votes.setdefault(track, Counter())[number] += 1 if lies else -1
+
+    def deny(self, tracks: NDArray[np.int64], number: int) -> None:
+        """Some tracks (T,) cannot lie on an object, whatever was seen before."""
+        for track in tracks.tolist():
+            votes = self._votes.setdefault(track, Counter())
+            votes[number] = min(votes[number], 0) - 1
+
+    def joined(self, ids: NDArray[np.int64], labels: Ints, guessed: Bools) -> NDArray[np.int64]:
+        """Labels (N,) of observations, of which those of the background that lay on an object are its own.
+
+        Parameters
+        ----------
+        ids : (N,) int64
+            Their tracks.
+        labels : (N,) int
+        guessed : (N,) bool
+            Which labels are but guesses.
+        """
+        result = labels.astype(np.int64)
+        for k in self._asked(ids, (labels == BACKGROUND) | (guessed & (labels < BACKGROUND))):
+            number, vote = self._votes[int(ids[k])].most_common(1)[0]
+            if vote >= (_JOINS if guessed[k] else _SURE_JOINS):
+                result[k] = number
+        return result
+
+    def corrected(self, ids: NDArray[np.int64], labels: Ints, guessed: Bools) -> NDArray[np.int64]:
+        """Labels (N,) of observations by all looks so far, as of `joined`; what lay beside its object is
+        background."""
+        result = self.joined(ids, labels, guessed)
+        for k in self._asked(ids, labels > BACKGROUND):
+            track = int(ids[k])
+            needed = self._patience + (_SURE_LEAVES if track in self._decided else _LEAVES)
+            if self._votes[track][int(labels[k])] <= -needed:
+                result[k] = BACKGROUND
+        return result
+
+    def _asked(self, ids: NDArray[np.int64], which: Bools) -> list[int]:
+        """Those of some observations of whose tracks there are votes."""
+        known = np.fromiter(self._votes, np.int64, len(self._votes))
+        rows = np.flatnonzero(which)
+        return list(rows[np.isin(ids[rows], known)].tolist())
+
+    def forget(self, gone: NDArray[np.int64]) -> None:
+        """Drop what is known of some tracks (T,) that have ended; one that comes again is a new one."""
+        for track in gone.tolist():
+            self._votes.pop(track, None)
+            self._decided.discard(track)
