@@ -60,7 +60,8 @@ class Clip:
         """Labels of all rows after the check; all is decided unless ``guessed`` (T,) names tracks. ``joined``
         (T,) have lain on the object before."""
         check = FigureGround(fps=fps)
-        check._votes.update({(track, 1): 5 for track in ([] if joined is None else joined.tolist())})
+        for _ in range(5 if joined is not None else 0):
+            check._votes.cast(joined, 1, np.ones(len(joined), bool))
         labels = self.labels() if labels is None else labels
         short = np.isin(self.points.ids, [] if guessed is None else guessed)
         for frame, grey in enumerate(self.greys):
@@ -226,26 +227,47 @@ def test_what_joined_leaves_where_it_lies_far_from_the_rest() -> None:
     assert corrected[np.isin(clip.points.ids, on_it)].all()
 
 
-def test_a_track_that_has_ended_is_forgotten() -> None:
-    check = FigureGround()
-    check._votes.update({(1, 1): -1, (2, 1): -1, (3, 1): 2, (4, 1): 2})
-    check.forget(np.array([1, 3, 9]))
-    corrected = check.corrected(np.array([1, 2, 3, 4]), np.array([1, 1, -1, -1]), np.ones(4, bool))
-    assert corrected.tolist() == [1, 0, -1, 1]
+def test_what_a_window_called_ground_on_an_object_is_its_own() -> None:
+    """A face of a turning thing may stand still for a window."""
+    clip = sliding_square()
+    ids = clip.points.ids
+    face = clip.on_object[:12]
+    labels = np.where(np.isin(ids, face), 0, clip.labels())
+    corrected = clip.corrected(labels=labels)
+    assert (corrected[np.isin(ids, face)] == 1).all()
+    assert not corrected[np.isin(ids, clip.ground)].any()
 
 
-@pytest.mark.parametrize(("fps", "needed"), [(None, 1), (30.0, 1), (10.0, 2)])
-@pytest.mark.parametrize("decided", [False, True])
-def test_a_track_leaves_by_so_many_looks(fps: float | None, needed: int, decided: bool) -> None:
-    """One of which a window has decided by one more, and so at a low rate."""
-    check = FigureGround(fps=fps)
-    points = FramePoints(np.array([7]), np.array([[50.0, 50.0]], np.float32))
-    picture = Picture(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
-    check.add(picture, points, np.array([1]), np.array([False]), np.array([not decided]))
-    for against in range(1, 4):
-        check._votes[7, 1] = -against
-        label = check.corrected(points.ids, np.array([1]), np.array([not decided]))
-        assert label[0] == (against < needed + decided)
+def test_tracks_that_live_between_two_looks_are_asked_too() -> None:
+    """Looks are four frames apart; each of these tracks lives for one frame, on the square or beside it."""
+    clip = sliding_square()
+    ids, frame = clip.points.ids, clip.points.frame
+    brief = np.isin(ids, [*clip.on_object[1::3], *clip.outside])
+    single = replace(clip.points, ids=np.where(brief, ids + 10_000 * (1 + frame), ids))
+    clip = replace(clip, points=single)
+    labels = np.where(brief & (frame % 2 == 0), 0, np.where(brief, 1, clip.labels())).astype(np.int32)
+    labels[np.isin(ids, clip.ground)] = 0
+    corrected = clip.corrected(labels=labels, guessed=np.unique(single.ids[brief]))
+    inside = np.isin(ids, clip.on_object)
+    assert (corrected[brief & inside] == 1).mean() > 0.95
+    assert (corrected[brief & ~inside] == 0).mean() > 0.95
+
+
+def test_a_new_object_is_looked_at_in_the_frames_before() -> None:
+    """The window that knows nothing of it labels the first half; of its tracks there one in two ends before
+    the other half begins."""
+    clip = sliding_square()
+    ids, frame = clip.points.ids, clip.points.frame
+    inside = np.isin(ids, clip.on_object)
+    short = np.isin(ids, clip.on_object[::2])
+    rows = (~short | (frame < 10)) & ~np.isin(ids, clip.outside)
+    clip = only(clip, rows)
+    ids, frame, inside, short = clip.points.ids, clip.points.frame, inside[rows], short[rows]
+    labels = np.where(inside & (frame >= 15), 1, 0).astype(np.int32)
+    corrected = clip.corrected(labels=labels, guessed=clip.on_object)
+    assert (corrected[inside & ~short] == 1).all()
+    assert (corrected[short] == 1).mean() > 0.9
+    assert not corrected[~inside].any()
 
 
 def test_no_points_are_no_error() -> None:

@@ -42,3 +42,20 @@ def test_neither_side_alone_nor_two_objects_nor_a_guess_is_enough() -> None:
     assert between.say_of(IDS, None, one)[0].tolist() == [0, 0, 0, 0]
     assert between.say_of(IDS, one, other)[0].tolist() == [1, 0, 0, 1]
     assert between.say_of(IDS, less, other)[0].tolist() == [1, 0, 1, 0]
+
+
+def test_a_window_that_took_an_object_for_the_world_is_denied() -> None:
+    """Where those before and after agree of enough tracks, and it says otherwise of most."""
+    ids = np.arange(40)
+    world, turned = [0] * 25 + [1] * 15, [2] * 25 + [0] * 15
+    right, wrong = window(world, ids=ids), window(turned, ids=ids)
+    assert wrong.is_denied_by(right, right)
+    assert not right.is_denied_by(right, right)
+    assert not right.is_denied_by(right, wrong)
+    a_part = window([0] * 25 + [0] * 15, ids=ids)
+    assert not a_part.is_denied_by(right, right)
+    few = window(world[:19], ids=ids[:19])
+    assert not wrong.is_denied_by(few, few)
+    guessed = window(world, [False] * 40, ids=ids)
+    assert not wrong.is_denied_by(guessed, right)
+    assert not window(turned, [False] * 40, ids=ids).is_denied_by(right, right)

@@ -215,3 +215,24 @@ def test_an_object_is_as_sure_as_its_surest_window() -> None:
     assert linker.surest(2) == 0.0
     linker.link(window(ids), ones)
     assert linker.surest(1) == 1.0
+
+
+def test_tracks_that_only_follow_tell_where_too_few_are_decided() -> None:
+    """Where the picture moves fast few tracks last for two windows."""
+    linker = Linker(3)
+    first, second = np.arange(12), np.arange(4, 16)
+    decided = np.isin(first, range(4))
+    assert linker.link(window(first), np.ones(12, int), decided).tolist() == [1] * 12
+    decided = np.isin(second, range(12, 16))
+    assert linker.link(window(second), np.ones(12, int), decided).tolist() == [1] * 12
+
+
+def test_nor_do_they_tell_where_most_of_them_stand() -> None:
+    """Of a car that a window takes for the world a few tracks ride along with the houses."""
+    linker = Linker(3)
+    car, house = np.arange(12), np.arange(20, 40)
+    linker.link(window(car), np.ones(12, int))
+    both = np.concatenate([car, house])
+    labels = np.where(np.isin(both, range(4, 12)), 0, 1)
+    decided = ~np.isin(both, range(4))
+    assert linker.link(window(both), labels, decided)[-1] == 2
