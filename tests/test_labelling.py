@@ -253,6 +253,20 @@ def test_nor_is_one_that_alone_saw_something_move() -> None:
     assert len(changes([1, 1, 0, 0, 0])) == 1
 
 
+def test_nor_is_one_that_took_the_object_for_the_world() -> None:
+    """Not even of what it alone has seen, for all that it calls moving stands."""
+    clip = standing_crowd(frames=90)
+    brief = (clip.ids != 40) | ((clip.frame >= 39) & (clip.frame < 45))
+    clip = replace(clip, frame=clip.frame[brief], ids=clip.ids[brief], xy=clip.xy[brief])
+
+    def label(ids: np.ndarray, window: int) -> np.ndarray:
+        return np.where(ids < 15, 1, 0) if window != 2 else np.where(ids < 15, 0, 2)
+
+    sure = Told(label, sure=lambda window: 1.0)
+    labels = label_clip(clip, sure, replace(CONFIG, least_seconds=0.1))
+    assert (labels == np.where(clip.ids < 15, 1, 0)).all()
+
+
 def test_short_tracks_follow_their_neighbours() -> None:
     clip = standing_crowd(frames=60)
     brief = (clip.ids != 0) | (clip.frame < 6)

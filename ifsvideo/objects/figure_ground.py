@@ -141,8 +141,7 @@ class FigureGround:
 
     def _look(self, place: int) -> None:
         """Look at the objects in a frame that have not been looked at for long."""
-        here = self._recent.at(place)
-        assert here is not None
+        here = self._recent[place]
         labels = self._labels_in(here)
         looks, due = {}, []
         for number in np.unique(labels[labels > BACKGROUND]).tolist():
@@ -165,7 +164,7 @@ class FigureGround:
     def _look_back(self, place: int, number: int) -> None:
         """Look at a new object in the frames before: it was in sight, but no window knew that it moves."""
         step = max(1, round(self._seldom))
-        while (there := self._recent.at(place := place - step)) is not None:
+        while (there := self._recent.get(place := place - step)) is not None:
             own = self._labels_in(there) == number
             if np.count_nonzero(own) < _FEW:
                 return
@@ -177,13 +176,10 @@ class FigureGround:
         Then what lies on it stands by itself; and who walks before it moves his limbs otherwise than himself,
         so that his silhouette would not hold them.
         """
-        here, farthest = self._recent.at(place), self.lags[-1]
-        assert here is not None
+        here, farthest = self._recent[place], self.lags[-1]
         ids, xy = here.points.ids[here.ground], here.points.xy[here.ground]
         for end in (max(0, place - farthest), min(self._recent.count - 1, place + farthest)):
-            other = self._recent.at(end)
-            assert other is not None
-            step = lengths(other.points.positions(ids) - xy)
+            step = lengths(self._recent[end].points.positions(ids) - xy)
             seen = step[np.isfinite(step)]
             if len(seen) and middle(seen) > _STANDS:
                 return False
@@ -201,8 +197,7 @@ class FigureGround:
     def _look_at(self, place: int, number: int, own: Bools) -> None:
         """Find the silhouette of an object in a frame, where its own tracks (N,) are known, and count the
         votes of the tracks round it."""
-        here = self._recent.at(place)
-        assert here is not None
+        here = self._recent[place]
         xy, ids, labelled = here.xy, here.points.ids, here.labels == number
         told = labelled if np.count_nonzero(labelled) >= _FEW else own
         astray = own & ~around(here, told).contains(xy, _ASTRAY)
@@ -228,11 +223,10 @@ class FigureGround:
     def _carry(self, seen: Sighting, place: int, number: int, own: Bools) -> None:
         """Carry a silhouette with its object to the frames next to its own, and count the votes of tracks
         that have ended before it, or begin after: many live for a frame or two."""
-        here = self._recent.at(place)
-        assert here is not None
+        here = self._recent[place]
         ids, xy, known = here.points.ids[own], here.xy[own], here.points.ids
         for lag in range(1, self._carried + 1):
-            for other in (self._recent.at(place - lag), self._recent.at(place + lag)):
+            for other in (self._recent.get(place - lag), self._recent.get(place + lag)):
                 if other is None:
                     continue
                 free = other.guessed & ((other.labels <= BACKGROUND) | (other.labels == number))

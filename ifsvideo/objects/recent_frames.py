@@ -94,7 +94,14 @@ class RecentFrames:
         self._kept.append(frame)
         self.count += 1
 
-    def at(self, place: int) -> RecentFrame | None:
-        """The frame before which so many came; None where it is kept no longer, or has not come."""
+    def __getitem__(self, place: int) -> RecentFrame:
+        """The frame before which so many came; `IndexError` where it is kept no longer, or has not come."""
+        frame = self.get(place)
+        if frame is None:
+            raise IndexError(place)
+        return frame
+
+    def get(self, place: int) -> RecentFrame | None:
+        """The same; None where it is kept no longer, or has not come."""
         back = self.count - place
         return self._kept[-back] if 0 < back <= len(self._kept) else None

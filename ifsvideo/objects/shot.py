@@ -82,10 +82,10 @@ class _Window:
 class Shot:
     """Collects frames, has their windows labelled, links these, checks borders, and numbers the objects.
 
-    Whether an observation moves is what the window says whose centre is nearest in time; with which object,
-    what most windows say of its track. A frame comes out when the second window after that one is linked: so
-    its labels rest on what is seen up to there, less than two windows later, and on nothing beyond, however
-    long the labelling of a window takes.
+    Whether an observation moves is what the window says whose centre is nearest in time, but for one that
+    those before and after deny; with which object, what most windows say of its track. A frame comes out when
+    the second window after that one is linked: so its labels rest on what is seen up to there, less than two
+    windows later, and on nothing beyond, however long the labelling of a window takes.
 
     Parameters
     ----------
@@ -201,16 +201,19 @@ class Shot:
         self._blocks.append(stop)
         block = self._frames[start - self._gone : stop - self._gone]
         movers, before = self._linker.movers(), self._before
-        denied = before is not None and after is not None and window.is_denied_by(before, after)
+        deniers = None
+        if before is not None and after is not None and window.is_denied_by(before, after):
+            deniers = (before, after)
         for place, frame in enumerate(block, start):
             ids = frame.points.ids
-            if denied and before is not None and after is not None:
-                nearest = before if 2 * place < before.bounds[1] + after.bounds[0] else after
-                frame.labels, frame.guessed = nearest.say_of(ids)
-            else:
+            if deniers is None:
                 frame.labels, frame.guessed = window.say_of(ids, before, after)
+            else:
+                first, second = deniers
+                nearest = first if 2 * place < first.bounds[1] + second.bounds[0] else second
+                frame.labels, frame.guessed = nearest.say_of(ids)
             frame.guessed |= (frame.labels == BACKGROUND) & np.isin(ids, movers)
-        self._before = None if denied else window
+        self._before = window if deniers is None else None
         if not self._config.check_borders:
             return
         labels, corrected = self._labels_now(block), self._labels_now(block, corrected=True)

@@ -82,8 +82,7 @@ def look_for(frames: RecentFrames, place: int, own: Bools, lags: Sequence[int]) 
     Sighting or None
         None where the motion of the object or the ground is not known, or where they have not parted.
     """
-    here = frames.at(place)
-    assert here is not None
+    here = frames[place]
     seen = _sight(frames, place, own, around(here, own), lags)
     if seen is None:
         return None
@@ -93,14 +92,12 @@ def look_for(frames: RecentFrames, place: int, own: Bools, lags: Sequence[int]) 
 
 def _sight(frames: RecentFrames, place: int, own: Bools, view: View, lags: Sequence[int]) -> Sighting | None:
     """The silhouette in a view."""
-    here = frames.at(place)
-    if here is None or min(view.width, view.height) < _SMALLEST:
-        return None
+    here = frames[place]
     motions = Motions(view, here.xy, own, here.ground & ~own, here.guessed, math.hypot(*here.size) / 800)
-    if not motions.known:
+    if not motions.known or min(view.width, view.height) < _SMALLEST:
         return None
     sides = [
-        _parted(motions, here.points.ids, [(lag, frames.at(place + way * lag)) for lag in lags])
+        _parted(motions, here.points.ids, [(lag, frames.get(place + way * lag)) for lag in lags])
         for way in (-1, 1)
     ]
     if not any(sides):
