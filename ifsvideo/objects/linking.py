@@ -21,8 +21,8 @@ class Linker:
     A track belongs to the object to which most windows gave it. Each label of a window takes the number with
     which it shares most tracks, one to one, so that most tracks in all keep theirs:
 
-    - Only tracks of which windows could decide count at first; what shares too few of these with any takes
-      the number with which it shares most of all tracks, if most of that one's still move.
+    - Only tracks of which both windows could decide count at first. A label that shares some of these with a
+      number, but too few, takes it if the others agree, which but follow their neighbours.
     - Birth: a label that shares too few tracks is a new object, or one that was lost a moment ago, if place
       and motion agree (`ifsvideo.objects.reappearance`).
     - Death: an object that no window finds for ``longest_loss`` frames does not come back; its number is
@@ -112,7 +112,9 @@ class Linker:
         number_for = self._by_shared_tracks(here, labels[sure], numbers[sure])
         others = [label for label in here if label not in number_for]
         every[np.isin(every, list(number_for.values()))] = 0
-        number_for |= self._by_shared_tracks(others, labels, _moving(every, labels))
+        number_for |= self._by_shared_tracks(
+            others, labels, _told_by_all(every, labels, np.where(sure, numbers, 0))
+        )
         sights = {label: Sight.of(tracks, labels == label, start, stride) for label in here}
         unknown = {label: sights[label] for label in here if label not in number_for}
         taken = number_for.values()
@@ -181,11 +183,17 @@ class Linker:
         linked[members] = numbers[certain][nearest]
 
 
-def _moving(numbers: NDArray[np.int64], labels: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The numbers (P,) of those objects of whose tracks a window calls at least half moving, else 0."""
-    result = numbers.copy()
-    for number in np.unique(numbers[numbers > 0]).tolist():
-        said = labels[(numbers == number) & (labels >= BACKGROUND)]
-        if 2 * np.count_nonzero(said > BACKGROUND) < len(said):
-            result[numbers == number] = 0
+def _told_by_all(
+    every: NDArray[np.int64], labels: NDArray[np.int64], firm: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The numbers (P,) of those objects most of whose tracks a window gives to one label; most tracks of that
+    label, of those that have a number, must have theirs, one of them ``firm``ly (P,). Else 0."""
+    result = np.zeros_like(every)
+    for number in np.unique(every[every > 0]).tolist():
+        said = labels[(every == number) & (labels >= BACKGROUND)]
+        for label, count in Counter(said.tolist()).most_common(1):
+            its = labels == label
+            alone = 2 * count > len(said) and 2 * count > np.count_nonzero(its & (every > 0))
+            if label > BACKGROUND and alone and (firm[its] == number).any():
+                result[every == number] = number
     return result
