@@ -29,7 +29,7 @@ _KEPT = 3
 _FEW, _ASTRAY = 3, 1.0
 """Labelled tracks of an object from which on they alone tell where it is, and how far beyond their view the
 tracks that joined it may lie, share of the view: a thing does not fall apart."""
-_SELDOM_S, _OFTEN_S = 0.134, 0.067
+_SELDOM_S, _OFTEN_S = 0.134, 0.1
 """Longest and shortest time between two looks at an object, seconds."""
 _CARRIED_S = 0.15
 """How far a silhouette is carried to tracks that are not seen in its frame, seconds: to the next look. Twice
