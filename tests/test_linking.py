@@ -239,3 +239,12 @@ def test_nor_do_they_tell_where_most_of_them_stand() -> None:
     guessed_from(linker, car, np.ones(12, int), range(12))
     labels = np.where(np.isin(both, range(4, 12)), 0, 1)
     assert guessed_from(linker, both, labels, range(3, 40))[-1] == 2
+
+
+def test_nor_where_they_are_scattered() -> None:
+    """Of an object that a window gives to three others alike none is the same."""
+    linker = Linker(3)
+    guessed_from(linker, np.arange(12), np.ones(12, int), range(12))
+    labels = np.repeat([1, 2, 3], 4)
+    firm = [0, 4, 8]
+    assert 1 not in linker.link(window(np.arange(12)), labels, np.isin(np.arange(12), firm)).tolist()

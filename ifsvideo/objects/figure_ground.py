@@ -35,8 +35,7 @@ _CARRIED_S = 0.15
 """How far a silhouette is carried to tracks that are not seen in its frame, seconds: to the next look. Twice
 as far it errs more than it finds."""
 _LOST = 0.22
-"""Share of an object's tracks that may have ended since the last look: so each track is asked some four times
-in its life."""
+"""Share of an object's tracks that may have ended since the last look, before the next one is due early."""
 _HELD = 0.7
 """Share of the tracks of which a window has decided that a silhouette must hold. One that holds fewer is that
 of a part, or of something else: what was taken for the ground moves with the object."""
