@@ -19,6 +19,7 @@ from ifsvideo.errors import OutputError, UsageError
 from ifsvideo.output.atomic import Outputs
 from ifsvideo.types import Image, VideoInfo
 from ifsvideo.video import VideoWriter, check_output, open_source
+from ifsvideo.video.picture import planes_of
 
 SMALL = VideoInfo(64, 48, Fraction(25))
 COLOURS = [
@@ -95,6 +96,19 @@ def test_what_is_written_is_read_again(tmp_path: Path, ending: str) -> None:
         # Each bar is wide enough for a centre free of neighbours' colour; compression alone may change it.
         assert image[24, centres].astype(int) == pytest.approx(original[24, centres].astype(int), abs=6)
     assert os.listdir(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize("size", [(2, 2), (160, 120), (1280, 722)])
+def test_planes_are_those_of_the_standard(size: tuple[int, int]) -> None:
+    """Rec. ITU-R BT.709, 16 to 235; also where a picture is so large that it is made in several strips."""
+    width, height = size
+    image = np.random.default_rng(0).integers(0, 256, (height, width, 3), np.uint8)
+    planes = planes_of(image)
+    luma = image / 255 @ (0.2126, 0.7152, 0.0722)
+    blue, red = (image[..., 2] / 255 - luma) / 1.8556, (image[..., 0] / 255 - luma) / 1.5748
+    halves = [plane.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3)) for plane in (blue, red)]
+    expected = np.concatenate([219 * luma.ravel() + 16, 224 * np.ravel(halves) + 128])
+    np.testing.assert_allclose(planes.ravel(), expected, atol=1.01)
 
 
 def test_a_browser_plays_it(tmp_path: Path) -> None:
