@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ifsvideo.config import OverlayConfig
 from ifsvideo.output import hull
 from ifsvideo.output.alpha import alone
+from ifsvideo.output.dots import draw_dots
 from ifsvideo.output.legend import Box, draw_legend, draw_number
 from ifsvideo.output.palette import (
     BACKGROUND_COLOUR,
@@ -26,8 +27,6 @@ from ifsvideo.types import BACKGROUND, Image, Scene
 _LUMA = np.array([0.299, 0.587, 0.114])
 _DISCREET = 0.75
 _RIM: Colour = (16, 18, 20)
-_ANGLES = (np.arange(12) + 0.5) * (np.pi / 6.0)
-_CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -48,9 +47,9 @@ class _Sizes:
     def of(cls, image: Image) -> _Sizes:
         diagonal = float(np.hypot(*image.shape[:2]))
         return cls(
-            dot=max(1.2, 0.0024 * diagonal),
+            dot=max(1.8, 0.6 + 0.0024 * diagonal),
             rim=max(0.5, 0.0007 * diagonal),
-            small_dot=max(0.5, 0.001 * diagonal),
+            small_dot=max(1.1, 0.6 + 0.001 * diagonal),
             trail=max(1, round(0.0016 * diagonal)),
             small_trail=max(1, round(0.0007 * diagonal)),
             outline=max(1, round(0.0014 * diagonal)),
@@ -108,8 +107,8 @@ class OverlayRenderer:
             draw_trails(canvas, scene.trails, styles, look.bands)
         if look.ground:
             undecided = shown & (scene.labels < BACKGROUND)
-            _dots(canvas, scene.xy[undecided], sizes.small_dot, UNDECIDED_COLOUR, _DISCREET)
-            _dots(canvas, scene.xy[still], sizes.small_dot, BACKGROUND_COLOUR, _DISCREET)
+            draw_dots(canvas, scene.xy[undecided], sizes.small_dot, UNDECIDED_COLOUR, _DISCREET)
+            draw_dots(canvas, scene.xy[still], sizes.small_dot, BACKGROUND_COLOUR, _DISCREET)
         for item in objects:
             _draw_object(canvas, scene, item, sizes, look)
         self._write(canvas, scene, objects, sizes)
@@ -159,18 +158,5 @@ def _draw_object(canvas: Image, scene: Scene, item: _Object, sizes: _Sizes, look
         edges = [hull.fixed_point(polygon) for polygon in item.polygons]
         cv2.polylines(canvas, edges, True, colour, sizes.outline, cv2.LINE_AA, hull.SUBPIXEL_BITS)
     if look.dots:
-        _dots(canvas, scene.xy[item.points], sizes.dot + sizes.rim, _RIM)
-        _dots(canvas, scene.xy[item.points], sizes.dot, colour)
-
-
-def _dots(
-    canvas: Image, xy: NDArray[np.float32], radius: float, colour: Colour, opacity: float = 1.0
-) -> None:
-    """Draw a dot at each point, which must be on the picture."""
-    column, row = np.round(xy).astype(np.intp).T
-    below = canvas[np.clip(row, 0, canvas.shape[0] - 1), np.clip(column, 0, canvas.shape[1] - 1)]
-    mixed = (opacity * np.array(colour) + (1.0 - opacity) * below).tolist()
-    # Polygons, since OpenCV draws a small circle as a diamond.
-    outlines = hull.fixed_point(xy[:, None, :] + radius * _CIRCLE)
-    for corners, ink in zip(outlines, mixed, strict=True):
-        cv2.fillConvexPoly(canvas, corners, ink, cv2.LINE_AA, hull.SUBPIXEL_BITS)
+        draw_dots(canvas, scene.xy[item.points], sizes.dot + sizes.rim, _RIM)
+        draw_dots(canvas, scene.xy[item.points], sizes.dot, colour)
