@@ -10,7 +10,7 @@ from ifsvideo.config import OverlayConfig
 from ifsvideo.output import hull
 from ifsvideo.output.legend import clock, draw_legend, draw_number
 from ifsvideo.output.overlay import OverlayRenderer
-from ifsvideo.output.palette import BACKGROUND_COLOUR, ink_on, label_colour, object_colour
+from ifsvideo.output.palette import BACKGROUND_COLOUR, BACKGROUND_TRAIL, ink_on, label_colour, object_colour
 from ifsvideo.output.scenes import Scenes
 from ifsvideo.types import FramePoints, Scene, VideoInfo
 
@@ -112,6 +112,39 @@ def test_trail_has_gaps_where_the_point_was_not_seen():
     assert (out[200, 320] == out[400, 320]).all()
     assert (out[200, 520] != out[400, 520]).any()
     assert (out[:150, :500] == out[0, 0]).all()
+
+
+def test_a_trail_lets_through_the_picture_below_each_of_its_parts():
+    """The oldest over red, the others over blue: none takes the other's colour."""
+    image = grey(1280, 720, 0)
+    image[:, :227, 0] = image[:, 227:, 2] = 200
+    trail = np.stack([[[x, y] for y in (200, 500)] for x in np.linspace(40, 600, 7)])
+    out = OverlayRenderer(NO_LEGEND).draw(image, scene(trail[-1], [0, 0], trail)).astype(int)
+    for x, opacity in ((120, 0.25), (320, 0.46), (500, 0.85)):
+        beside = out[400, x]
+        wanted = opacity * (BACKGROUND_TRAIL - beside)
+        for y in (200, 500):
+            # A thin line does not cover the pixels below it entirely.
+            cover = (out[y, x] - beside) @ wanted / (wanted @ wanted)
+            assert 0.75 < cover < 1.02
+            np.testing.assert_allclose(out[y, x], beside + cover * wanted, atol=2)
+
+
+def test_a_trail_of_less_than_the_dot_is_not_drawn():
+    still = np.array([[[100.2, 90.1]], [[100.0, 90.3]], [[100.0, 90.0]]])
+    renderer = OverlayRenderer(NO_LEGEND)
+    np.testing.assert_array_equal(
+        renderer.draw(grey(), scene(still[-1], [1], still)), renderer.draw(grey(), scene(still[-1], [1]))
+    )
+
+
+def test_a_slow_trail_has_no_gaps():
+    """Though each of its parts is shorter than a pixel."""
+    xs = np.linspace(100, 110, 26)
+    trail = np.stack([[[x, 90.0]] for x in xs])
+    config = OverlayConfig(legend=False, style="trails")
+    out = OverlayRenderer(config).draw(grey(), scene(trail[-1], [1], trail))
+    assert (out[90, 101:111] != out[0, 0]).any(axis=1).all()
 
 
 def test_sizes_follow_the_picture():
