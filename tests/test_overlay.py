@@ -236,6 +236,23 @@ def test_scenes_follow_a_track_back_in_time():
     assert after([], slice(0), []).trails.shape == (3, 0, 2)
 
 
+@pytest.mark.parametrize("trail", [0, 1, 4])
+def test_trails_of_tracks_that_end_and_come_back(trail):
+    """A trail is where its track was in each of the last frames, whatever happened in between."""
+    rng = np.random.default_rng(3)
+    scenes = Scenes(VideoInfo(10, 10, Fraction(10)), trail_s=trail / 10)
+    where = np.full((40, 30, 2), np.nan, np.float32)
+    for frame in range(40):
+        ids = np.flatnonzero(rng.random(30) < (0.0 if frame in (20, 21) else 0.6))
+        where[frame, ids] = rng.uniform(0, 9, (len(ids), 2))
+        points = FramePoints(ids.astype(np.int64), where[frame, ids])
+        found = scenes.next(points, np.zeros(len(ids), np.int32)).trails
+        past = np.full((trail + 1, len(ids), 2), np.nan, np.float32)
+        known = where[max(0, frame - trail) : frame + 1, ids]
+        past[len(past) - len(known) :] = known
+        np.testing.assert_array_equal(found, past)
+
+
 def test_numbers_keep_clear_of_the_legend_and_of_each_other():
     canvas = grey(640, 360)
     taken = draw_legend(canvas, 1.0, 3, 4, 9)

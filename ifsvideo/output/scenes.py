@@ -26,13 +26,32 @@ class Scenes:
         trail = 1 + max(0, round(trail_s * float(info.fps)))
         nothing = FramePoints(np.empty(0, np.int64), np.empty((0, 2), np.float32))
         self._past: deque[FramePoints] = deque([nothing] * trail, maxlen=trail)
+        self._trails = np.empty((trail, 0, 2), np.float32)
+        self._largest_id = -1
         self._frame = 0
 
     def next(self, points: FramePoints, labels: NDArray[np.int32]) -> Scene:
         """The scene of the next frame; its points are ordered by id."""
+        self._trails = self._continued(points)
         self._past.append(points)
-        trails = np.stack([earlier.positions(points.ids) for earlier in self._past])
+        if len(points.ids):
+            self._largest_id = max(self._largest_id, int(points.ids[-1]))
         time_s = self._info.time_of(self._frame)
-        scene = Scene(self._frame, time_s, points.ids, points.xy, labels, trails)
+        scene = Scene(self._frame, time_s, points.ids, points.xy, labels, self._trails)
         self._frame += 1
         return scene
+
+    def _continued(self, points: FramePoints) -> NDArray[np.float32]:
+        """The trails (T, N, 2) of these points: those of the frame before, where they were seen in it."""
+        trails = np.full((len(self._past), len(points.ids), 2), np.nan, np.float32)
+        trails[-1] = points.xy
+        _, before, now = np.intersect1d(
+            self._past[-1].ids, points.ids, assume_unique=True, return_indices=True
+        )
+        trails[:-1, now] = self._trails[1:, before]
+        back = points.ids <= self._largest_id
+        back[now] = False
+        if back.any():  # seen earlier, but not in the frame before
+            for positions, earlier in zip(trails[:-1], list(self._past)[1:], strict=True):
+                positions[back] = earlier.positions(points.ids[back])
+        return trails
