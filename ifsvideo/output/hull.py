@@ -109,9 +109,7 @@ def _fill_one(
     cv2.fillConvexPoly(small, fixed_point(corners), (1.0,), cv2.LINE_8, SUBPIXEL_BITS)
     soft = cv2.GaussianBlur(small, (0, 0), feather, borderType=cv2.BORDER_REPLICATE)
     weight = cv2.resize(soft, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
-    inside = np.ascontiguousarray(image[top:bottom, left:right])
-    tint = np.empty_like(inside)
-    tint[:] = colour
-    lit = cv2.addWeighted(inside, 1.0 - opacity, tint, opacity, 0.0)
+    tinted = np.column_stack([(1.0 - opacity) * np.eye(3), opacity * np.array(colour)])
+    lit = cv2.transform(image[top:bottom, left:right], tinted)
     region = canvas[top:bottom, left:right]
-    region[:] = cv2.blendLinear(lit, np.ascontiguousarray(region), weight, 1.0 - weight)
+    cv2.blendLinear(lit, region, weight, 1.0 - weight, dst=region)
