@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -16,6 +17,7 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 BOLD = cv2.FONT_HERSHEY_DUPLEX
 # Height of a capital letter at scale 1, pixels.
 _CAPITAL = 21.0
+_DIGIT = re.compile(r"\d")
 PANEL: Colour = (18, 20, 24)
 PANEL_OPACITY = 0.62
 INK: Colour = (240, 242, 244)
@@ -104,6 +106,12 @@ def _overlap(a: Box, b: Box) -> bool:
 
 def text_width(text: str, capital: int, font: int) -> int:
     """Width of a line whose capitals are ``capital`` pixels high, pixels."""
+    return _width(_DIGIT.sub("0", text), capital, font)
+
+
+@lru_cache(maxsize=64)
+def _width(text: str, capital: int, font: int) -> int:
+    """`text_width`, kept: it takes as long as to write the text, and all digits are equally wide."""
     return int(cv2.getTextSize(text, font, capital / _CAPITAL, _thickness(capital))[0][0])
 
 
