@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
@@ -69,14 +69,17 @@ def groups(xy: Floats, reach: float) -> NDArray[np.intp]:
     found = KDTree(xy).query(xy, k=count + 1)
     distance, neighbour = np.asarray(found[0]), np.asarray(found[1])
     bridged = max(reach, 4.0 * float(np.median(distance[:, 1])))
-    point, column = np.nonzero(np.asarray(distance <= bridged))
-    links = coo_array((np.ones(len(point)), (point, neighbour[point, column])), shape=(len(xy), len(xy)))
+    near = np.asarray(distance <= bridged)
+    ends = np.append(0, np.cumsum(near.sum(axis=1)))
+    links = csr_array((np.ones(ends[-1]), neighbour[near], ends), shape=(len(xy), len(xy)))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.intp)
 
 
 def _rounded_hull(xy: Floats, margin: float) -> NDArray[np.float32]:
     """Convex hull of discs of radius ``margin`` round the points."""
-    discs = (xy[:, None, :] + margin * _CIRCLE).reshape(-1, 2).astype(np.float32)
+    # Of the points only those of their own hull matter: to find them is quick, and the discs are few then.
+    outermost = cv2.convexHull(np.asarray(xy, np.float32))
+    discs = (outermost + margin * _CIRCLE).reshape(-1, 2).astype(np.float32)
     return np.asarray(cv2.convexHull(discs), dtype=np.float32).reshape(-1, 2)
 
 
