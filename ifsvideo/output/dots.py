@@ -11,8 +11,6 @@ from ifsvideo.types import Floats, Image
 
 _PIXEL = np.dtype("V3")
 """Three bytes as one: numpy fetches and places pixels so in half the time."""
-_STEPS = 16
-"""Steps of a pixel in which the distance from a dot's middle is told when pixels are ordered."""
 
 
 def draw_dots(canvas: Image, xy: Floats, radius: float, colour: Colour, opacity: float = 1.0) -> None:
@@ -29,23 +27,27 @@ def draw_dots(canvas: Image, xy: Floats, radius: float, colour: Colour, opacity:
     opacity : float
         Of the dots, 0 to 1.
     """
-    pixel, distance = _touched(canvas.shape[1], canvas.shape[0], xy, radius)
-    if not len(pixel):
-        return
-    share = (opacity * np.minimum(radius + 0.5 - distance, 1.0)).astype(np.float32)[None]
+    edge, cover, inside = _touched(canvas.shape[1], canvas.shape[0], xy, radius)
     pixels = canvas.reshape(-1).view(_PIXEL)
-    below = pixels[pixel].view(np.uint8).reshape(1, -1, 3)
-    ink = np.empty_like(below)
-    cv2.rectangle(ink, (0, 0), (len(pixel), 1), colour, cv2.FILLED)
-    pixels[pixel] = cv2.blendLinear(ink, below, share, 1.0 - share).reshape(-1).view(_PIXEL)
+    if opacity < 1.0:  # what lies below shows inside too
+        edge, cover = np.append(edge, inside), opacity * np.append(cover, np.ones(len(inside), np.float32))
+    if len(edge):
+        share = cover.astype(np.float32)[None]
+        below = pixels[edge].view(np.uint8).reshape(1, -1, 3)
+        ink = np.empty_like(below)
+        cv2.rectangle(ink, (0, 0), (len(edge), 1), colour, cv2.FILLED)
+        pixels[edge] = cv2.blendLinear(ink, below, share, 1.0 - share).reshape(-1).view(_PIXEL)
+    if opacity == 1.0:  # last: a dot's edge may lie inside another dot
+        pixels[inside] = np.array(colour, np.uint8).view(_PIXEL)
 
 
 def _touched(
     width: int, height: int, xy: Floats, radius: float
-) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Pixels (K,) of the flat picture that dots touch, and how far off the dot's middle is (K,), pixels.
+) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.intp]]:
+    """Pixels of the flat picture that dots cover in part (K,), to which share (K,), and entirely (L,).
 
-    A pixel that several dots touch is told once of each, the nearest last: what is assigned last stays.
+    A pixel that several dots touch is told once of each, where it is covered most last: what is assigned last
+    stays.
     """
     reach = radius + 0.5
     middle = xy.T[..., None]
@@ -56,7 +58,9 @@ def _touched(
     across, down = np.square(window - middle, dtype=np.float32)
     squared = (down[:, :, None] + across[:, None, :]).ravel()
     pixel = (width * row[:, :, None] + column[:, None, :]).ravel()
-    near = np.flatnonzero(squared < reach**2)
-    distance = np.sqrt(squared[near])
-    order = np.argsort((_STEPS * distance).astype(np.uint16), kind="stable")[::-1]
-    return pixel[near[order]], distance[order]
+    whole = squared <= max(radius - 0.5, 0.0) ** 2
+    inside = np.flatnonzero(whole)
+    edge = np.flatnonzero(~whole & (squared < reach**2))
+    cover = reach - np.sqrt(squared[edge])
+    order = np.argsort((255 * cover).astype(np.uint8), kind="stable")
+    return pixel[edge[order]], cover[order], pixel[inside]
