@@ -44,7 +44,7 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
         own = np.nonzero(models.inliers[same])[1].reshape(-1, size)
         paths = W[:, own].transpose(1, 0, 2)
         if not complete:
-            paths = np.stack([along_mean_path(W[:, each], seen[:, each]) for each in own])
+            paths = along_mean_path(paths, seen[:, own].transpose(1, 0, 2))
         if centred:
             mean[same] = paths.mean(axis=2)
             paths = paths - mean[same, :, None]
