@@ -101,17 +101,17 @@ def test_what_is_surely_alike_merges_at_once() -> None:
     place = np.array([[0.0, 0.0], [200.0, 0.0], [6.0, 0.0], [206.0, 0.0], [3.0, 5.0], [215.0, 0.0]])
     xy = (place[:, None] + [[-1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]).reshape(-1, 2)[None] + np.zeros((4, 1, 1))
     cues = Cues(Tracks.from_array(xy), xy[0], np.ones(18), np.zeros(18), 1.0, 10)
-    measured: list[int] = []
+    measured: list[list[int]] = []
 
     class Counting(Cues):
-        def merge(self, groups: Sequence[Group]) -> Group:
-            measured.append(len(groups))
-            return super().merge(groups)
+        def merge_each(self, sets: Sequence[Sequence[Group]]) -> list[Group]:
+            measured.append([len(groups) for groups in sets])
+            return super().merge_each(sets)
 
     cues.__class__ = Counting
     merging = Agglomeration(cues, rule(gap_always=2.0, constant=-2 * np.log(60)))
     groups = merging.run(window(np.repeat(np.arange(6), 3)))
-    assert measured == [3, 2, 2]
+    assert measured == [[3, 2], [2]]
     assert [merge[:2] for merge in merging.merges] == [(0, 2), (4, 6), (1, 3), (5, 8)]
     assert [len(group.members) for group in groups] == [9, 9]
     assert merging.merges[1][2] == pytest.approx(max(merge[2] for merge in merging.merges[:2]))

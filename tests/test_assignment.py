@@ -78,6 +78,18 @@ def test_broken_inliers_still_span_their_affine_motion() -> None:
     assert found.max() < 1e-3
 
 
+@pytest.mark.parametrize("gaps", [False, True])
+def test_each_model_has_the_residuals_that_it_has_alone(gaps: bool) -> None:
+    """Whatever the numbers of inliers of the models beside it."""
+    scene = make_scene(movers=(LEFT_CAR,), static=80)
+    tracks = scene.with_gaps().tracks if gaps else scene.tracks
+    rng = np.random.default_rng(0)
+    members = [sorted(rng.choice(tracks.points, size, replace=False)) for size in range(3, 40, 3)]
+    found = residuals(tracks, models_of(*members, tracks=tracks), True)
+    alone = [residuals(tracks, models_of(own, tracks=tracks), True)[0] for own in members]
+    assert_allclose(found, alone, rtol=1e-6, atol=1e-5)
+
+
 def test_exact_affine_motion_has_no_residual_and_another_has() -> None:
     first = np.random.default_rng(0).uniform(100, 300, (60, 2))
     one, other = affine_tracks(first[:30], some_maps(10, 0)), affine_tracks(first[30:], some_maps(10, 1))

@@ -133,6 +133,18 @@ def test_merged_groups_are_measured_as_one() -> None:
     assert merged.rigid == pytest.approx(whole.rigid)
 
 
+def test_sets_that_are_merged_together_are_measured_as_one_by_one() -> None:
+    cues, pieces = measure(bodies())
+    sets = [pieces[:2], pieces[2:], pieces[1:], pieces[:1]]
+    fresh, own = measure(bodies())
+    for together, parts in zip(cues.merge_each(sets), ([0, 1], [2, 3], [1, 2, 3], [0]), strict=True):
+        alone = fresh.merge([own[part] for part in parts])
+        assert together.members.tolist() == alone.members.tolist()
+        assert together.inside == pytest.approx(alone.inside)
+        assert together.rigid == pytest.approx(alone.rigid)
+        assert together.affine == pytest.approx(alone.affine)
+
+
 def test_large_segments_are_measured_by_some_of_their_points() -> None:
     tracks = Tracks.from_array(np.random.default_rng(0).uniform(0, 99, (5, 300, 2)))
     cues = Cues(tracks, tracks.xy[0], np.ones(300), np.zeros(tracks.points), 1.0, 10)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ifsvideo.segmentation.lowrank import Subspace, along_mean_path, trajectory_matrix
+from ifsvideo.segmentation.lowrank import Subspace, along_mean_path, stacks, trajectory_matrix
 from ifsvideo.types import Tracks
 
 EXACT = 1e-3
@@ -89,6 +89,25 @@ def test_two_bodies_are_not_one(broken: bool) -> None:
     xy = np.concatenate([body(seed=0), body(seed=3) + np.arange(15)[:, None, None] ** 2 * [0.5, 0]], axis=1)
     alone, both = (holes(part) if broken else Tracks.from_array(part) for part in (xy[:, :40], xy))
     assert np.median(residual(both)) > max(1.0, 5 * np.median(residual(alone)))
+
+
+@pytest.mark.parametrize("broken", [False, True])
+def test_sets_of_any_size_are_fitted_together_as_by_themselves(broken: bool) -> None:
+    xy = body(points=80) + np.random.default_rng(0).normal(0, 0.05, (15, 80, 2))
+    W, seen = trajectory_matrix(holes(xy) if broken else Tracks.from_array(xy), 12)
+    sets = [np.arange(start, start + size) for start, size in ((0, 30), (30, 1), (31, 3), (34, 12), (46, 2))]
+    sets += [np.arange(48, 80, 4), np.arange(2, 80, 3)]  # every third one has no gaps
+    found = []
+    for which, own, there in stacks(W, seen, sets, 3):
+        spaces = Subspace.fit(own, there, 3)
+        for space in (spaces, spaces.main(own, there, 2)):
+            for number, together in zip(which, space.distance(W, seen), strict=True):
+                alone = Subspace.fit(W[:, sets[number]], seen[:, sets[number]], 3)
+                if space is not spaces:
+                    alone = alone.main(W[:, sets[number]], seen[:, sets[number]], 2)
+                assert together == pytest.approx(alone.distance(W, seen), rel=1e-6, abs=1e-6)
+        found += which.tolist()
+    assert sorted(found) == list(range(len(sets)))
 
 
 def test_a_point_that_goes_its_own_way_stands_out() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from ifsvideo.segmentation import world as fitting
 from ifsvideo.segmentation.config import SegmenterConfig
 from ifsvideo.segmentation.world import World, fit_world
 from ifsvideo.types import Tracks
@@ -101,6 +104,37 @@ def test_one_car_before_a_camera_that_stays_is_no_parallax(name: str, car: Mover
     evidence = evidence_of(scene)
     assert (evidence[scene.truth == 0] < 1).mean() >= 0.97
     assert (evidence[scene.truth == 1] > 1).mean() > 0.9
+
+
+@pytest.mark.parametrize("name", ["standing", "only turning"])
+def test_a_camera_that_surely_stayed_is_not_tried_on_its_way_and_that_changes_nothing(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tracks = make_scene(CAMERAS[name], (LEFT_CAR,), seed=1).tracks
+    tried = []
+
+    def counting(*arguments: Any) -> Any:
+        tried.append(arguments)
+        return best_start(*arguments)
+
+    best_start, in_many_places = fitting._best_start, fitting._in_many_places
+    monkeypatch.setattr(fitting, "_best_start", counting)
+    without = fit_world(tracks, SIZE, np.random.default_rng(0))
+    assert not tried
+    # As if some cells were not enough to tell that it stayed.
+    told: list[bool] = []
+
+    def at_first_unsure(*arguments: Any) -> bool:
+        told.append(in_many_places(*arguments) if told else True)
+        return told[-1]
+
+    monkeypatch.setattr(fitting, "_in_many_places", at_first_unsure)
+    tried_all = fit_world(tracks, SIZE, np.random.default_rng(0))
+    assert len(tried) == 1
+    assert told == [True, False]
+    assert without is not None
+    assert tried_all is not None
+    assert np.array_equal(without.evidence(1.0), tried_all.evidence(1.0))
 
 
 def test_movers_in_broken_tracks() -> None:

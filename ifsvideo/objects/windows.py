@@ -253,12 +253,14 @@ def _votes(
     # Most live for a few frames: each of these by itself (L,), not all frames of the window.
     track, frame = np.nonzero(tracks.visible[:, short].T)
     first = np.searchsorted(track, np.arange(len(short)))
-    own, others = tracks.xy[frame, short[track]], near[track]
-    both = tracks.visible[frame[:, None], others]
+    # With the observations last (2, N, L) each path is one run through memory.
+    planes, row = tracks.planes.reshape(2, -1), frame * tracks.points
+    own, others = planes.take(row + short[track], axis=1), row + near[track].T
+    both = tracks.visible.ravel().take(others)
     # Rigid neighbours keep their offset; perspective changes it in proportion to the way.
-    slip = _extent(tracks.xy[frame[:, None], others] - own[:, None], both, first)
-    slip[np.add.reduceat(both, first, dtype=np.int64) < 2] = np.inf
-    way = _extent(own, np.ones(len(own), dtype=bool), first)
+    slip = _extent(planes.take(others, axis=1) - own[:, None], both, first).T
+    slip[np.add.reduceat(both, first, axis=1, dtype=np.int64).T < 2] = np.inf
+    way = _extent(own, np.ones(len(frame), dtype=bool), first)
     least = slip.min(axis=1, keepdims=True)
     told = np.isfinite(least[:, 0])
     excess = np.full_like(slip, np.inf)
@@ -273,8 +275,8 @@ def _votes(
 
 
 def _extent(xy: NDArray[np.float64], seen: Bools, first: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Diagonal of the box (S, ...) that each of the paths fills where it is seen; their places (L, ..., 2)
+    """Diagonal of the box (..., S) that each of the paths fills where it is seen; their places (2, ..., L)
     one path after the other, each from its ``first`` (S,) on."""
-    low = np.minimum.reduceat(np.where(seen[..., None], xy, np.inf), first)
-    high = np.maximum.reduceat(np.where(seen[..., None], xy, -np.inf), first)
-    return np.asarray(np.linalg.norm(np.where(high >= low, high - low, 0.0), axis=-1), np.float64)
+    low = np.minimum.reduceat(np.where(seen, xy, np.inf), first, axis=-1)
+    high = np.maximum.reduceat(np.where(seen, xy, -np.inf), first, axis=-1)
+    return np.asarray(np.linalg.norm(np.where(high >= low, high - low, 0.0), axis=0), np.float64)

@@ -86,30 +86,34 @@ class Agglomeration:
 
     def merge(self, parts: Sequence[Group], motions: int | None = None, stop: float = 0.5) -> list[Group]:
         """The same from groups that were measured already."""
-        groups, before = dict(enumerate(parts)), len(self.merges)
+        groups, merges_before = dict(enumerate(parts)), len(self.merges)
 
-        def join(numbers: Sequence[int]) -> None:
-            first, *others = numbers
-            for place, other in enumerate(others, 1):
-                cost = max(apart[known, other] for known in numbers[:place])
-                self.merges.append((min(first, other), max(first, other), cost))
-                first = len(parts) + len(self.merges) - before - 1
+        def join(sets: Sequence[Sequence[int]]) -> None:
+            wholes = []
+            for first, *others in sets:
+                known = [first]
+                for other in others:
+                    cost = max(apart[before, other] for before in known)
+                    self.merges.append((min(first, other), max(first, other), cost))
+                    first = len(parts) + len(self.merges) - merges_before - 1
+                    known.append(other)
+                wholes.append(first)
             # Measured once, however many they are.
-            groups[first] = self.cues.merge([groups.pop(number) for number in numbers])
+            merged = self.cues.merge_each([[groups.pop(number) for number in numbers] for numbers in sets])
+            groups.update(zip(wholes, merged, strict=True))
 
         apart = self._apart(groups, {})
         # Told how many, one pair at a time: sets might leave fewer.
         while motions is None and (alike := _alike(list(groups), apart, min(SURE, stop))):
-            for numbers in alike:
-                join(numbers)
+            join(alike)
             apart = self._apart(groups, apart)
         while apart:
             pair, cost = min(apart.items(), key=lambda item: (item[1], item[0]))
             if cost > stop if motions is None else len(groups) <= motions:
                 break
-            join(pair)
+            join([pair])
             apart = self._apart(groups, apart)
-        merged = (cost for *_, cost in self.merges[before:])
+        merged = (cost for *_, cost in self.merges[merges_before:])
         self.doubt = max(self.doubt, *merged, *(1 - cost for cost in apart.values()), 0.0)
         return list(groups.values())
 

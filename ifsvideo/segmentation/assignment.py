@@ -10,6 +10,9 @@ from ifsvideo.segmentation.lowrank import along_mean_path, principal
 from ifsvideo.segmentation.sampling import AffineModels
 from ifsvideo.types import Bools, Tracks
 
+_SIZES = 4
+"""Models whose numbers of inliers are alike are taken together, as if these were multiples of so many."""
+
 
 def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np.float64]:
     """Distance of each trajectory to each model's subspace, ``r = |U U^T w - w|`` (thesis eq. 3.3).
@@ -39,15 +42,17 @@ def residuals(tracks: Tracks, models: AffineModels, centred: bool) -> NDArray[np
     complete = bool(seen.all())
     mean, main = np.zeros((len(models), len(W))), np.zeros((2, len(models), len(W)))
     sizes = models.inliers.sum(axis=1)
-    for size in set(sizes.tolist()):  # what has one shape is one stack
-        same = np.flatnonzero(sizes == size)
-        own = np.nonzero(models.inliers[same])[1].reshape(-1, size)
-        paths = W[:, own].transpose(1, 0, 2)
+    few = -(-sizes // _SIZES) * _SIZES
+    for size in set(few.tolist()):  # what has nearly one shape is one stack
+        same = np.flatnonzero(few == size)
+        own = np.argsort(~models.inliers[same], axis=1, kind="stable")[:, :size]
+        there = (np.arange(own.shape[1]) < sizes[same, None])[:, None].astype(np.float64)
+        paths = W[:, own].transpose(1, 0, 2) * there
         if not complete:
-            paths = np.stack([along_mean_path(W[:, each], seen[:, each]) for each in own])
+            paths = along_mean_path(paths, seen[:, own].transpose(1, 0, 2) * there) * there
         if centred:
-            mean[same] = paths.mean(axis=2)
-            paths = paths - mean[same, :, None]
+            mean[same] = paths.sum(axis=2) / sizes[same, None]
+            paths = (paths - mean[same, :, None]) * there
         axes = principal(paths, 2)
         main[: axes.shape[2], same] = np.moveaxis(axes, 2, 0)
     u, v = main / np.maximum(np.sqrt((main * main).sum(axis=2, keepdims=True)), 1e-12)

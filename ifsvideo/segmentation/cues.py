@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ifsvideo.segmentation import shear
 from ifsvideo.segmentation.leeway import Leeway
-from ifsvideo.segmentation.lowrank import Subspace, trajectory_matrix
+from ifsvideo.segmentation.lowrank import Subspace, stacks, trajectory_matrix
 from ifsvideo.segmentation.median import median
 from ifsvideo.types import Tracks
 
@@ -136,9 +136,8 @@ class Cues:
 
     def _each(self, parts: list[tuple[Members, Members]]) -> list[Group]:
         keys = [reliable.tobytes() for _, reliable in parts]
-        for key, (members, reliable) in zip(keys, parts, strict=True):
-            if key not in self._groups:
-                self._groups[key] = self._measured(members, reliable)
+        new = {key: part for key, part in zip(keys, parts, strict=True) if key not in self._groups}
+        self._groups.update(zip(new, self._measured(list(new.values())), strict=True))
         self._place([key for key in dict.fromkeys(keys) if key not in self._worldly])
         return [
             replace(self._groups[key], members=members, **self._worldly[key])
@@ -155,21 +154,35 @@ class Cues:
             depth = _deciles(self.nearness[group.reliable])
             self._worldly[key] = {"evidence": held, "yielding": gave_way, "depth": depth}
 
-    def _measured(self, members: Members, reliable: Members) -> Group:
+    def _measured(self, parts: list[tuple[Members, Members]]) -> list[Group]:
         """What does not depend on the static world."""
-        sample = reliable[:: 1 + (len(reliable) - 1) // _MOST]
-        W, seen = self.W[:, sample], self.seen[:, sample]
-        space = Subspace.fit(W, seen, 3)
-        rigid, affine = (each.distance(self.W, self.seen) for each in (space, space.main(W, seen, 2)))
-        inside = shear.score(self.tracks, shear.inside_edges(self.anchor, sample))
-        return Group(members, reliable, sample, 0.0, 0.0, np.zeros(3), inside, rigid, affine)
+        samples = [reliable[:: 1 + (len(reliable) - 1) // _MOST] for _, reliable in parts]
+        rigid, affine = (np.empty((len(parts), self.W.shape[1])) for _ in range(2))
+        # In one go: of a few points most of the time is taken by calls, not by numbers.
+        for which, W, seen in stacks(self.W, self.seen, samples, 3):
+            space = Subspace.fit(W, seen, 3)
+            rigid[which] = space.distance(self.W, self.seen)
+            affine[which] = space.main(W, seen, 2).distance(self.W, self.seen)
+        inside = shear.scores(self.tracks, [shear.inside_edges(self.anchor, sample) for sample in samples])
+        return [
+            Group(members, reliable, sample, 0.0, 0.0, np.zeros(3), *measured)
+            for (members, reliable), sample, *measured in zip(
+                parts, samples, inside.tolist(), rigid, affine, strict=True
+            )
+        ]
 
     def merge(self, groups: Sequence[Group]) -> Group:
         """Some groups as one."""
-        members, reliable = (
-            np.concatenate(parts) for parts in zip(*((g.members, g.reliable) for g in groups), strict=True)
+        return self.merge_each([groups])[0]
+
+    def merge_each(self, sets: Sequence[Sequence[Group]]) -> list[Group]:
+        """The same of several sets of groups, measured in one go."""
+        return self._each(
+            [
+                (np.concatenate([g.members for g in own]), np.concatenate([g.reliable for g in own]))
+                for own in sets
+            ]
         )
-        return self.group(members, reliable)
 
     def between(self, pairs: list[tuple[Group, Group]]) -> Array:
         """Measurements (N, 4 + len(CUES)) of pairs of groups: larger and smaller evidence, the same after the
@@ -189,17 +202,12 @@ class Cues:
         if not pairs:
             return
         edges = [shear.between_edges(self.anchor, a.sample, b.sample, self.pairs) for a, b in pairs.values()]
-        measured = zip(pairs.items(), self._shears(edges), self._gaps(edges), strict=True)
+        shears = shear.scores(self.tracks, edges)
+        # The typical one where no edge was ever seen.
+        shears = np.where(np.isfinite(shears), shears, self.typical_inside)
+        measured = zip(pairs.items(), shears.tolist(), self._gaps(edges), strict=True)
         for (key, (a, b)), between, gap in measured:
-            self._pairs[key] = self._between(a, b, float(between), float(gap))
-
-    def _shears(self, edges: list[Members]) -> Array:
-        """Shear and stretch between the groups of each pair, the typical one where no edge was ever seen."""
-        first = np.cumsum([0, *map(len, edges[:-1])])
-        total, seen = (
-            np.add.reduceat(part, first) for part in shear.totals(self.tracks, np.concatenate(edges))
-        )
-        return np.where(seen > 0, total / np.maximum(seen, 1), self.typical_inside)
+            self._pairs[key] = self._between(a, b, between, float(gap))
 
     def _gaps(self, edges: list[Members]) -> Array:
         """Least distance of each pair, pixels: the edges come nearest first."""

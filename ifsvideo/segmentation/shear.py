@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
@@ -41,11 +43,22 @@ def totals(tracks: Tracks, edges: NDArray[np.int64]) -> tuple[NDArray[np.float64
 
 
 def score(tracks: Tracks, edges: NDArray[np.int64]) -> float:
-    """Mean over edges and frames of shear plus stretch (Algorithm 2); NaN where no edge was ever measured."""
-    if not len(edges):
-        return float("nan")
-    total, seen = totals(tracks, edges)
-    return float(total.sum() / seen.sum()) if seen.any() else float("nan")
+    """Mean over edges (E, 2) and frames of shear plus stretch (Algorithm 2); NaN where no edge was ever
+    measured."""
+    return float(scores(tracks, [edges])[0])
+
+
+def scores(tracks: Tracks, sets: Sequence[NDArray[np.int64]]) -> NDArray[np.float64]:
+    """The same of each of some sets of edges, in one go."""
+    found = np.full(len(sets), np.nan)
+    some = [number for number, edges in enumerate(sets) if len(edges)]
+    if some:
+        every = [sets[number] for number in some]
+        first = np.cumsum([0, *map(len, every[:-1])])
+        total, seen = (np.add.reduceat(part, first) for part in totals(tracks, np.concatenate(every)))
+        np.divide(total, seen, out=total, where=seen > 0)
+        found[some] = np.where(seen > 0, total, np.nan)
+    return found
 
 
 def inside_edges(anchor: NDArray[np.float64], members: NDArray[np.int64]) -> NDArray[np.int64]:

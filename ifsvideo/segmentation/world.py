@@ -239,11 +239,17 @@ def fit_world(tracks: Tracks, size: tuple[int, int], rng: np.random.Generator) -
     time = (frames - frames[reference]) / max(frames[-1] - frames[0], 1)
     X = np.column_stack([place / np.exp(LENS_PRIOR[0]), np.zeros(tracks.points)])
     few = bundle.subset(picked)
-    start, turned = _best_start(few, X[picked], time)
-    moved = bundle.solve_points(_with_all(start, X, picked), 6)
-    far = bundle.solve_points(_with_all(_all_far(few, turned, X[picked]), X, picked), 3)
-    has_moved = _has_moved(bundle, moved, far)
-    estimate = bundle.solve(moved if has_moved else far, [1.0] * LAST_STEPS, translate=has_moved)
+    turned = _turned(few, X[picked], len(frames))
+    estimate = bundle.solve_points(_with_all(_all_far(few, turned, X[picked]), X, picked), 3)
+    far_away = bundle.rms(bundle.residual(estimate)) < 2 * bundle.tolerance
+    has_moved = False
+    # The starts take most of the time: without them where too few points could need them.
+    if _in_many_places(bundle, ~far_away):
+        moved = bundle.solve_points(_with_all(_best_start(few, turned, time), X, picked), 6)
+        near = bundle.rms(bundle.residual(moved)) < bundle.tolerance
+        has_moved = _in_many_places(bundle, near & ~far_away)
+        estimate = moved if has_moved else estimate
+    estimate = bundle.solve(estimate, [1.0] * LAST_STEPS, translate=has_moved)
     return World(frames, bundle, bundle.solve_points(estimate, 3), side, has_moved).above_road()
 
 
@@ -299,19 +305,16 @@ def _with_all(found: Estimate, X: Array, picked: NDArray[np.int64]) -> Estimate:
     return replace(found, X=places)
 
 
-def _has_moved(bundle: Bundle, moved: Estimate, far: Estimate) -> bool:
-    """Whether enough points have parallax that the camera must have moved.
+def _in_many_places(bundle: Bundle, parallax: Bools) -> bool:
+    """Whether points with parallax (P,) lie in so many places that the camera must have moved.
 
     One thing that crosses the view of a standing camera fits a camera that moves past it while all else is
     far away; which of the two it is, only the number of places tells.
     """
-    near = bundle.rms(bundle.residual(moved)) < bundle.tolerance
-    still = bundle.rms(bundle.residual(far)) < 2 * bundle.tolerance
     counted = bundle.weight > 0
     place = bundle.observed[..., counted].sum(axis=0) / bundle.seen[:, counted].sum(axis=0)
     cell = _cells(place.T)
-    needing = np.unique(cell[(near & ~still)[counted]])
-    return len(needing) >= PARALLAX_SHARE * len(np.unique(cell))
+    return len(np.unique(cell[parallax[counted]])) >= PARALLAX_SHARE * len(np.unique(cell))
 
 
 def _set_off(bundle: Bundle, turned: Estimate, frames: NDArray[np.int64]) -> Estimate:
@@ -331,16 +334,18 @@ def _typical(bundle: Bundle, estimate: Estimate) -> float:
     return float(np.median(bundle.rms(bundle.residual(estimate)) / bundle.tolerance))
 
 
-def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estimate]:
-    """The best of several starts: a camera that turns, then moves with constant speed in one of some
-    directions; and the camera that only turns."""
-    cameras = len(time)
+def _turned(bundle: Bundle, X: Array, cameras: int) -> Estimate:
+    """The camera that only turns."""
     rest = Estimate(
         np.repeat(np.eye(3)[None], cameras, axis=0), np.zeros((cameras, 3)), X, LENS_PRIOR[0], 0.0
     )
-    turned = bundle.solve(rest, [32.0, 16.0, 8.0, 4.0, 2.0, 1.0], translate=False)
-    near = X.copy()
-    near[:, :2] = turned.X[:, :2]
+    return bundle.solve(rest, [32.0, 16.0, 8.0, 4.0, 2.0, 1.0], translate=False)
+
+
+def _best_start(bundle: Bundle, turned: Estimate, time: Array) -> Estimate:
+    """The best of several starts: a camera that turns, then moves with constant speed in one of some
+    directions."""
+    near = turned.X.copy()
     near[:, 2] = 0.03  # 30 times the camera's way: far enough for any first step
     starts = [
         replace(turned, t=2 * time[:, None] * np.array(direction, dtype=float), X=near)
@@ -349,7 +354,7 @@ def _best_start(bundle: Bundle, X: Array, time: Array) -> tuple[Estimate, Estima
     found = bundle.solve_each(starts, FALLING)
     best = np.sort(np.argsort(_costs(bundle, found), kind="stable")[:FINALISTS])
     finished = bundle.solve_each([found[k] for k in best], [2.0] + [1.0] * (FINAL_STEPS - 1))
-    return finished[int(np.argmin(_costs(bundle, finished)))], turned
+    return finished[int(np.argmin(_costs(bundle, finished)))]
 
 
 def _costs(bundle: Bundle, found: Sequence[Estimate]) -> Array:
