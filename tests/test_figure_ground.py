@@ -12,6 +12,7 @@ import pytest
 
 from ifsvideo.config import Config, ObjectsConfig
 from ifsvideo.objects.figure_ground import FigureGround
+from ifsvideo.objects.sighting import look_for
 from ifsvideo.pipeline import Pipeline
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import FramePoints, Segmentation, Tracks, VideoInfo
@@ -251,6 +252,30 @@ def test_tracks_that_live_between_two_looks_are_asked_too() -> None:
     inside = np.isin(ids, clip.on_object)
     assert (corrected[brief & inside] == 1).mean() > 0.95
     assert (corrected[brief & ~inside] == 0).mean() > 0.95
+
+
+@pytest.mark.parametrize("all_told", [True, False])
+def test_an_object_is_looked_at_rarely_once_its_tracks_are_told(all_told: bool, monkeypatch) -> None:
+    """Not so if many on it are new tracks, nor if these are taken for ground."""
+    clip = sliding_square()
+    ids, frame = clip.points.ids, clip.points.frame
+    brief = np.isin(ids, [] if all_told else clip.on_object[::2])
+    clip = replace(clip, points=replace(clip.points, ids=np.where(brief, ids + 10_000 * (1 + frame), ids)))
+    places: list[int] = []
+
+    def looked(frames, place, own, lags):
+        places.append(place)
+        return look_for(frames, place, own, lags)
+
+    monkeypatch.setattr("ifsvideo.objects.figure_ground.look_for", looked)
+    for guessed in (None, np.unique(clip.points.ids[brief])):
+        labels = np.where(brief & (guessed is not None), 0, clip.labels() | brief).astype(np.int32)
+        places.clear()
+        clip.corrected(labels=labels, guessed=guessed)
+        if all_told:
+            assert places == [0, 5, 10, 22]
+        else:
+            assert np.diff([*places, FRAMES]).max() <= 5
 
 
 def test_a_new_object_is_looked_at_in_the_frames_before() -> None:

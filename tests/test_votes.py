@@ -55,6 +55,17 @@ def test_looks_at_one_object_tell_nothing_of_another() -> None:
     assert label(votes, 2, guessed=True) == 2
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_track_is_told_once_one_look_more_changes_nothing(sign: int) -> None:
+    """Neither by looks at another object."""
+    votes = voted({track: sign * track for track in range(5)})
+    votes.cast(np.array([9, 9, 9]), 2, np.ones(3, bool))
+    assert votes.told(np.array([0, 1, 2, 3, 4, 9, 10]), 1).tolist() == [False] * 3 + [True] * 2 + [False] * 2
+    for track in (3, 4):
+        votes.cast(np.array([track]), 1, np.array([sign < 0]))
+        assert label(votes, 1, guessed=True, track=track) == (1 if sign > 0 else 0)
+
+
 def test_what_is_denied_leaves_whatever_was_seen_before() -> None:
     votes = voted({7: 5})
     votes.deny(np.array([7]), 1)

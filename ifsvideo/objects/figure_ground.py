@@ -30,7 +30,11 @@ _FEW, _ASTRAY = 3, 1.0
 """Labelled tracks of an object from which on they alone tell where it is, and how far beyond their view the
 tracks that joined it may lie, share of the view: a thing does not fall apart."""
 _SELDOM_S, _OFTEN_S = 0.134, 0.1
-"""Longest and shortest time between two looks at an object, seconds."""
+"""Longest and shortest time between two looks at an object of which more is to be told, seconds."""
+_RARELY_S, _UNTOLD = 0.4, 0.2
+"""Time between two looks, seconds, where nearly all tracks are told, and the share of those on and round the
+object that may not be: what is followed for long has few new ones. With a larger share objects that come into
+sight lose some of their tracks."""
 _CARRIED_S = 0.15
 """How far a silhouette is carried to tracks that are not seen in its frame, seconds: to the next look. Twice
 as far it errs more than it finds."""
@@ -85,7 +89,7 @@ class FigureGround:
         self._scale = scale
         self.lags = parting.lags(rate, _LAGS_S)
         """Frames between two pictures that are compared."""
-        self._seldom, self._often = _SELDOM_S * rate, _OFTEN_S * rate
+        self._seldom, self._often, self._rarely = _SELDOM_S * rate, _OFTEN_S * rate, _RARELY_S * rate
         self._carried = min(max(1, round(_CARRIED_S * rate)), self.lags[-1])
         self._recent = RecentFrames(_KEPT * self.lags[-1] + 1)
         self._looks: dict[int, _Look] = {}
@@ -144,10 +148,9 @@ class FigureGround:
         labels = self._labels_in(here)
         looks, due = {}, []
         for number in np.unique(labels[labels > BACKGROUND]).tolist():
-            look = self._looks.get(number)
-            tracks = here.points.ids[labels == number]
-            if look is None or self._is_due(look, place, tracks):
-                look = _Look(place, tracks)
+            look, own = self._looks.get(number), labels == number
+            if look is None or self._is_due(look, place, number, own):
+                look = _Look(place, here.points.ids[own])
                 due.append(number)
             looks[number] = look
         # The camera is asked last: in most frames nobody is due.
@@ -184,14 +187,19 @@ class FigureGround:
                 return False
         return True
 
-    def _is_due(self, look: _Look, place: int, tracks: NDArray[np.int64]) -> bool:
+    def _is_due(self, look: _Look, place: int, number: int, own: Bools) -> bool:
+        """Whether an object, of which some tracks (N,) of a frame are, is to be looked at there again."""
         since = place - look.place
-        if since >= self._seldom:
-            return True
-        if since < self._often:
+        if since < self._often or since >= self._rarely:
+            return since >= self._rarely
+        here = self._recent[place]
+        near = here.guessed & (here.labels <= BACKGROUND)
+        near[near] = around(here, own).contains(here.xy[near])
+        told = self._votes.told(here.points.ids[own | near], number)
+        if np.count_nonzero(told) >= (1 - _UNTOLD) * len(told):
             return False
-        left = np.count_nonzero(np.isin(look.tracks, tracks, assume_unique=True))
-        return bool(left < (1 - _LOST) * len(look.tracks))
+        left = np.count_nonzero(np.isin(look.tracks, here.points.ids[own], assume_unique=True))
+        return bool(since >= self._seldom or left < (1 - _LOST) * len(look.tracks))
 
     def _look_at(self, place: int, number: int, own: Bools) -> None:
         """Find the silhouette of an object in a frame, where its own tracks (N,) are known, and count the

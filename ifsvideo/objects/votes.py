@@ -15,6 +15,8 @@ the object's, and one of which a window has decided."""
 _JOINS, _SURE_JOINS = 1, 2
 """Looks by which a track of the background must have lain on an object more often than beside it: one that is
 guessed to be background, and one of which a window has decided."""
+_TOLD = 3
+"""Looks by which more must have said the one than the other, until a track is told."""
 _SLOW = 20.0
 """Frames a second below which it takes one look more to leave: pictures that are a tenth of a second apart
 differ by more than two motions. Without this a fiftieth of what moves in KT3DMoSeg goes to the background."""
@@ -48,6 +50,12 @@ class Votes:
         for track in tracks.tolist():
             votes = self._votes.setdefault(track, Counter())
             votes[number] = min(votes[number], 0) - 1
+
+    def told(self, tracks: NDArray[np.int64], number: int) -> Bools:
+        """Whether looks at an object have told (T,) of some tracks (T,) whether they lie on it: what one more
+        says changes nothing."""
+        votes = [self._votes[track][number] if track in self._votes else 0 for track in tracks.tolist()]
+        return np.asarray(np.abs(np.array(votes, int)) >= _TOLD, bool)
 
     def joined(self, ids: NDArray[np.int64], labels: Ints, guessed: Bools) -> NDArray[np.int64]:
         """Labels (N,) of observations, of which those of the background that lay on an object are its own.
