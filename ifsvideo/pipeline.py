@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ifsvideo.ahead import Ahead
+from ifsvideo.allocator import give_back
 from ifsvideo.clip import Clip, Source, check_outputs, open_clip
 from ifsvideo.config import Config
 from ifsvideo.errors import UsageError
@@ -42,6 +43,8 @@ _AHEAD = 8
 """Frames that may be tracked before those behind are labelled."""
 _STAGES = ("reading", "tracking", "segmenting", "linking", "writing")
 """Stages whose seconds are told; they run side by side."""
+_GIVEN_BACK = 250
+"""Frames after which free memory is given back: often enough for it not to grow, too seldom to cost time."""
 _WORTH_A_PROCESS = 3
 """Windows from which on a process of its own pays: it takes as long to start as a window to label."""
 
@@ -246,6 +249,8 @@ class Pipeline:
                         sink.add(scene, image)
                 done += 1
                 tell("frames", done, clip.info.frames)
+                if done % _GIVEN_BACK == 0:
+                    give_back()
 
 
 def _exact(fps: Fraction | float | None) -> Fraction | None:
