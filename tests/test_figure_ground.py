@@ -12,8 +12,7 @@ import pytest
 
 from ifsvideo.config import Config, ObjectsConfig
 from ifsvideo.objects.figure_ground import FigureGround
-from ifsvideo.objects.sighting import NOWHERE, look_for
-from ifsvideo.objects.silhouette import Sides
+from ifsvideo.objects.sighting import look_for
 from ifsvideo.pipeline import Pipeline
 from ifsvideo.tracking.trajectories import Trajectories
 from ifsvideo.types import FramePoints, Segmentation, Tracks, VideoInfo
@@ -264,9 +263,9 @@ def test_an_object_is_looked_at_rarely_once_its_tracks_are_told(all_told: bool, 
     clip = replace(clip, points=replace(clip.points, ids=np.where(brief, ids + 10_000 * (1 + frame), ids)))
     places: list[int] = []
 
-    def looked(frames, place, own, *others):
+    def looked(frames, place, own, lags):
         places.append(place)
-        return look_for(frames, place, own, *others)
+        return look_for(frames, place, own, lags)
 
     monkeypatch.setattr("ifsvideo.objects.figure_ground.look_for", looked)
     for guessed in (None, np.unique(clip.points.ids[brief])):
@@ -277,27 +276,6 @@ def test_an_object_is_looked_at_rarely_once_its_tracks_are_told(all_told: bool, 
             assert places == [0, 5, 10, 22]
         else:
             assert np.diff([*places, FRAMES]).max() <= 5
-
-
-def test_a_view_that_had_to_grow_begins_as_large_in_one_look_of_two(monkeypatch) -> None:
-    """Only the left half of the square has tracks, so that each small view has to grow to the right."""
-    clip = sliding_square()
-    ids = clip.points.ids
-    right = np.isin(ids, clip.on_object.reshape(7, 7)[4:]) | np.isin(ids, clip.outside)
-    views: list[tuple[Sides, Sides]] = []
-
-    def looked(frames, place, own, lags, beyond):
-        seen = look_for(frames, place, own, lags, beyond)
-        views.append((beyond, seen.grown))
-        return seen
-
-    monkeypatch.setattr("ifsvideo.objects.figure_ground.look_for", looked)
-    only(clip, ~right).corrected()
-    to_the_right = Sides(right=True)
-    assert [begun for begun, _ in views] == [
-        NOWHERE if k % 2 == 0 else to_the_right for k in range(len(views))
-    ]
-    assert all(grown == to_the_right for _, grown in views)
 
 
 def test_a_new_object_is_looked_at_in_the_frames_before() -> None:

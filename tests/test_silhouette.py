@@ -129,17 +129,15 @@ def test_a_view_ends_with_the_picture(corner) -> None:
 def test_a_view_grows_where_a_silhouette_goes_on() -> None:
     view = View.around(np.array([[50, 40], [149, 89]], np.float32), 0.0, 0.0, (WIDTH, HEIGHT))
     figure = np.zeros((view.rows, view.columns), bool)
-
-    def grown(growth: float = 0.4) -> tuple[int, int, int, int]:
-        wider = view.grown(view.touched(figure, 0.1), growth, (WIDTH, HEIGHT))
-        return wider.left, wider.top, wider.width, wider.height
-
-    assert grown() == (50, 40, 100, 50)
+    assert view.grown_beyond(figure, 0.1, 0.4, (WIDTH, HEIGHT)) == view
     figure[5:, -1] = True
-    assert grown() == (50, 40, 140, 50)
+    wider = view.grown_beyond(figure, 0.1, 0.4, (WIDTH, HEIGHT))
+    assert (wider.left, wider.top, wider.width, wider.height) == (50, 40, 140, 50)
     figure[:] = True
-    assert grown() == (10, 20, 180, 90)
-    assert grown(4.0) == (0, 0, WIDTH, HEIGHT)
+    all_round = view.grown_beyond(figure, 0.1, 0.4, (WIDTH, HEIGHT))
+    assert (all_round.left, all_round.top, all_round.width, all_round.height) == (10, 20, 180, 90)
+    to_the_end = view.grown_beyond(figure, 0.1, 4.0, (WIDTH, HEIGHT))
+    assert (to_the_end.left, to_the_end.top, to_the_end.width, to_the_end.height) == (0, 0, WIDTH, HEIGHT)
 
 
 def test_what_lies_in_a_view_or_not_far_beyond_it() -> None:

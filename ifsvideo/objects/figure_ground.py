@@ -8,7 +8,7 @@ told from the object's own. The picture can tell: every few frames the object's 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ifsvideo.objects import parting
 from ifsvideo.objects.parting import affine, lengths, middle
 from ifsvideo.objects.recent_frames import RecentFrame, RecentFrames
-from ifsvideo.objects.sighting import NOWHERE, Sighting, around, look_for
-from ifsvideo.objects.silhouette import Sides
+from ifsvideo.objects.sighting import Sighting, around, look_for
 from ifsvideo.objects.votes import Votes
 from ifsvideo.types import BACKGROUND, Bools, FramePoints, Ints
 from ifsvideo.video.picture import Picture
@@ -51,18 +50,10 @@ stands, pixels."""
 
 @dataclass(frozen=True)
 class _Look:
-    """When an object was looked at last, the tracks (T,) that it had, on which sides its view had to grow,
-    and whether it began as large as the one before had become."""
+    """When an object was looked at last, and the tracks (T,) that it had."""
 
     place: int
     tracks: NDArray[np.int64]
-    grown: Sides = NOWHERE
-    begun_large: bool = False
-
-    def following(self, place: int, tracks: NDArray[np.int64]) -> _Look:
-        """The next look. One in two begins small again: it may not be needed any more to grow."""
-        large = any(self.grown) and not self.begun_large
-        return _Look(place, tracks, self.grown if large else NOWHERE, large)
 
 
 class FigureGround:
@@ -159,16 +150,14 @@ class FigureGround:
         for number in np.unique(labels[labels > BACKGROUND]).tolist():
             look, own = self._looks.get(number), labels == number
             if look is None or self._is_due(look, place, number, own):
-                tracks = here.points.ids[own]
-                look = look.following(place, tracks) if look else _Look(place, tracks)
+                look = _Look(place, here.points.ids[own])
                 due.append(number)
             looks[number] = look
         # The camera is asked last: in most frames nobody is due.
         if not looks or (not due and looks.keys() == self._looks.keys()) or self._camera_stands(place):
             return
         for number in due:
-            grown = self._look_at(place, number, labels == number, looks[number].grown)
-            looks[number] = replace(looks[number], grown=grown)
+            self._look_at(place, number, labels == number)
             if number not in self._known:
                 self._known.add(number)
                 self._look_back(place, number)
@@ -212,24 +201,23 @@ class FigureGround:
         left = np.count_nonzero(np.isin(look.tracks, here.points.ids[own], assume_unique=True))
         return bool(since >= self._seldom or left < (1 - _LOST) * len(look.tracks))
 
-    def _look_at(self, place: int, number: int, own: Bools, grown: Sides = NOWHERE) -> Sides:
+    def _look_at(self, place: int, number: int, own: Bools) -> None:
         """Find the silhouette of an object in a frame, where its own tracks (N,) are known, and count the
-        votes of the tracks round it. Its view has grown on some sides already; returns those on which it has
-        in the end."""
+        votes of the tracks round it."""
         here = self._recent[place]
         xy, ids, labelled = here.xy, here.points.ids, here.labels == number
         told = labelled if np.count_nonzero(labelled) >= _FEW else own
         astray = own & ~around(here, told).contains(xy, _ASTRAY)
         self._votes.deny(ids[astray], number)
         own = own & ~astray
-        seen = look_for(self._recent, place, own, self.lags, grown)
+        seen = look_for(self._recent, place, own, self.lags)
         if seen is None:
-            return NOWHERE
+            return
         rows = np.flatnonzero(seen.view.contains(xy))
         on = seen.lies_on(xy[rows])
         held = on[(labelled & ~here.guessed)[rows]]
         if np.count_nonzero(held) < _HELD * len(held):
-            return seen.grown
+            return
         guessed = here.guessed & (here.labels <= BACKGROUND)
         decided = ~here.guessed & (here.labels == BACKGROUND)
         for asked in (labelled, decided):
@@ -238,7 +226,6 @@ class FigureGround:
         along = seen.goes_along(xy, rows[free])
         self._votes.cast(ids[rows[free]], number, on[free] & along)
         self._carry(seen, place, number, own)
-        return seen.grown
 
     def _carry(self, seen: Sighting, place: int, number: int, own: Bools) -> None:
         """Carry a silhouette with its object to the frames next to its own, and count the votes of tracks

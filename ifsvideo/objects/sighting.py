@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from ifsvideo.objects.parting import NODES, PARTED, Motions, how_far_parted, lengths
 from ifsvideo.objects.recent_frames import RecentFrame, RecentFrames
-from ifsvideo.objects.silhouette import Flow, Parted, Sides, View, find_silhouette
+from ifsvideo.objects.silhouette import Flow, Parted, View, find_silhouette
 from ifsvideo.types import Bools
 
 _COMPARED = 2
@@ -27,19 +27,15 @@ _SMALLEST = 8
 _TOUCHED, _GROWN = 0.1, 0.4
 """Share of a side of its view that a silhouette covers where the object goes on beyond it, and how much
 farther is looked then, share of the view."""
-NOWHERE = Sides()
-"""No side."""
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """A silhouette (rows, columns) in its view, which grew on some sides, and the frames that told it, with
-    the tracks (N, 2) there."""
+    """A silhouette (rows, columns) in its view, and the frames that told it, with the tracks (N, 2) there."""
 
     view: View
     silhouette: Bools
     others: list[tuple[Parted, NDArray[np.float32]]]
-    grown: Sides = NOWHERE
 
     def lies_on(self, xy: NDArray[np.float32]) -> Bools:
         """Whether points (N, 2) in the view lie on the silhouette."""
@@ -68,9 +64,7 @@ def around(frame: RecentFrame, own: Bools) -> View:
     return View.around(frame.xy[own], _GROWTH, _MARGIN, frame.size)
 
 
-def look_for(
-    frames: RecentFrames, place: int, own: Bools, lags: Sequence[int], beyond: Sides = NOWHERE
-) -> Sighting | None:
+def look_for(frames: RecentFrames, place: int, own: Bools, lags: Sequence[int]) -> Sighting | None:
     """Find the silhouette of an object in a frame.
 
     Parameters
@@ -82,8 +76,6 @@ def look_for(
         Which of its points are the object's.
     lags : sequence of int
         Frames between two that may be compared, ascending.
-    beyond : Sides
-        Those on which its view had to grow a moment ago: it need not be looked at twice.
 
     Returns
     -------
@@ -91,19 +83,11 @@ def look_for(
         None where the motion of the object or the ground is not known, or where they have not parted.
     """
     here = frames[place]
-    view = around(here, own).grown(beyond, _GROWN, here.size)
-    seen = _sight(frames, place, own, view, lags)
+    seen = _sight(frames, place, own, around(here, own), lags)
     if seen is None:
         return None
-    # Once on each side: what is as plain as the object may go on for ever.
-    touched = seen.view.touched(seen.silhouette, _TOUCHED)
-    wider = view.grown(
-        Sides(*(new and not old for new, old in zip(touched, beyond, strict=True))), _GROWN, here.size
-    )
-    if wider != view:
-        seen = _sight(frames, place, own, wider, lags) or seen
-        beyond = Sides(*(new or old for new, old in zip(touched, beyond, strict=True)))
-    return replace(seen, grown=beyond)
+    wider = seen.view.grown_beyond(seen.silhouette, _TOUCHED, _GROWN, here.size)
+    return seen if wider == seen.view else _sight(frames, place, own, wider, lags) or seen
 
 
 def _sight(frames: RecentFrames, place: int, own: Bools, view: View, lags: Sequence[int]) -> Sighting | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,15 +38,6 @@ outline they lie on both sides of it."""
 
 Flow = NDArray[np.float32]
 """(R, C, 2) how far nodes of a view go, evenly spaced over it as the pixels of a small picture, pixels."""
-
-
-class Sides(NamedTuple):
-    """Some sides of a box."""
-
-    left: bool = False
-    top: bool = False
-    right: bool = False
-    bottom: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,19 +78,14 @@ class View:
         scale = min(1.0, (_PIXELS / (width * height)) ** 0.5)
         return cls(left, top, width, height, max(1, round(width * scale)), max(1, round(height * scale)))
 
-    def grown(self, sides: Sides, growth: float, size: tuple[int, int]) -> View:
-        """The view, larger by ``growth`` times its size on some sides, as far as the picture of ``size``
-        (width, height) goes."""
-        left, top, right, bottom = (growth * grows for grows in sides)
+    def grown_beyond(self, silhouette: Bools, share: float, growth: float, size: tuple[int, int]) -> View:
+        """The view, larger by ``growth`` times its size on the sides of which a silhouette (rows, columns) in
+        it covers more than a ``share``: there the object may go on."""
+        edges = (silhouette[:, 0], silhouette[0], silhouette[:, -1], silhouette[-1])
+        left, top, right, bottom = (growth * bool(edge.mean() > share) for edge in edges)
         low, extent = np.array([self.left, self.top], float), np.array([self.width, self.height])
         high = low + extent - 1
         return View._of(low - extent * [left, top], high + extent * [right, bottom], size)
-
-    def touched(self, silhouette: Bools, share: float) -> Sides:
-        """The sides of which a silhouette (rows, columns) in the view covers more than a ``share``: there the
-        object may go on."""
-        edges = (silhouette[:, 0], silhouette[0], silhouette[:, -1], silhouette[-1])
-        return Sides(*(bool(edge.mean() > share) for edge in edges))
 
     def nodes(self, columns: int, rows: int) -> NDArray[np.float32]:
         """Places (rows * columns, 2) in the picture, spaced as the pixels of a view of this size."""
