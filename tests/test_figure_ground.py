@@ -254,13 +254,15 @@ def test_tracks_that_live_between_two_looks_are_asked_too() -> None:
     assert (corrected[brief & ~inside] == 0).mean() > 0.95
 
 
-@pytest.mark.parametrize("all_told", [True, False])
-def test_an_object_is_looked_at_rarely_once_its_tracks_are_told(all_told: bool, monkeypatch) -> None:
-    """Not so if many on it are new tracks, nor if these are taken for ground."""
+@pytest.mark.parametrize("brief", ["none", "moving", "taken for ground", "beside it"])
+def test_an_object_is_looked_at_rarely_once_its_tracks_are_told(brief: str, monkeypatch) -> None:
+    """Not so if many tracks on it, or round it, live for one frame each."""
     clip = sliding_square()
     ids, frame = clip.points.ids, clip.points.frame
-    brief = np.isin(ids, [] if all_told else clip.on_object[::2])
-    clip = replace(clip, points=replace(clip.points, ids=np.where(brief, ids + 10_000 * (1 + frame), ids)))
+    own = {"none": [], "beside it": clip.outside}.get(brief, clip.on_object[::2])
+    new = np.isin(ids, own)
+    labels = np.where(new & (brief != "moving"), 0, clip.labels()).astype(np.int32)
+    clip = replace(clip, points=replace(clip.points, ids=np.where(new, ids + 10_000 * (1 + frame), ids)))
     places: list[int] = []
 
     def looked(frames, place, own, lags):
@@ -268,14 +270,11 @@ def test_an_object_is_looked_at_rarely_once_its_tracks_are_told(all_told: bool, 
         return look_for(frames, place, own, lags)
 
     monkeypatch.setattr("ifsvideo.objects.figure_ground.look_for", looked)
-    for guessed in (None, np.unique(clip.points.ids[brief])):
-        labels = np.where(brief & (guessed is not None), 0, clip.labels() | brief).astype(np.int32)
-        places.clear()
-        clip.corrected(labels=labels, guessed=guessed)
-        if all_told:
-            assert places == [0, 5, 10, 22]
-        else:
-            assert np.diff([*places, FRAMES]).max() <= 5
+    clip.corrected(labels=labels, guessed=None if brief == "moving" else np.unique(clip.points.ids[new]))
+    if brief == "none":
+        assert places == [0, 5, 10, 22]
+    else:
+        assert np.diff([*places, FRAMES]).max() <= 5
 
 
 def test_a_new_object_is_looked_at_in_the_frames_before() -> None:
