@@ -52,8 +52,8 @@ class Votes:
             votes[number] = min(votes[number], 0) - 1
 
     def told(self, tracks: NDArray[np.int64], number: int) -> Bools:
-        """Whether looks at an object have told (T,) of some tracks (T,) whether they lie on it: what one more
-        says changes nothing."""
+        """Whether looks at an object have told (T,) of some tracks (T,) whether they lie on it: one more
+        changes nothing, but for a decided track that has just left at a low rate."""
         votes = [self._votes[track][number] if track in self._votes else 0 for track in tracks.tolist()]
         return np.asarray(np.abs(np.array(votes, int)) >= _TOLD, bool)
 
