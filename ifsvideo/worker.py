@@ -16,10 +16,12 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
+from itertools import count
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
 from ifsvideo.ahead import POLL_S
+from ifsvideo.allocator import give_back
 from ifsvideo.errors import IfsVideoError
 from ifsvideo.stopwatch import Stopwatch
 
@@ -29,6 +31,9 @@ _COMMAND = "from ifsvideo.worker import serve; serve()"
 _KEPT = {"MALLOC_TOP_PAD_": str(32 << 20)}
 """Memory that glibc keeps when it is free, bytes: to give it back and take it again with every array of a
 megabyte costs the child a twentieth of its time."""
+_GIVEN_BACK = 64
+"""Calls after which the child gives free memory back all the same: what is kept grows by the holes between
+what lasts. Seldom, for what it needs next it must take again."""
 
 
 class Call(Generic[_Value]):
@@ -193,10 +198,12 @@ def serve() -> None:
     os.dup2(2, 1)  # what anyone prints must not get among the answers
     with suppress(EOFError, BrokenPipeError):
         function = pickle.load(requests)
-        while True:
+        for call in count(1):
             answer = _answer(function, pickle.load(requests))
             pickle.dump(answer, answers, protocol=pickle.HIGHEST_PROTOCOL)
             answers.flush()
+            if call % _GIVEN_BACK == 0:
+                give_back()
 
 
 def _answer(function: Callable[[Any], Any], argument: Any) -> tuple[bool, Any]:
