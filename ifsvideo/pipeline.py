@@ -39,8 +39,9 @@ from ifsvideo.tracking.tracker import KltTracker
 from ifsvideo.types import Bools, Counts, Progress, Renderer, Result, Segmenter, Sink, Tracker, Tracks
 from ifsvideo.worker import Caller, Worker
 
-_AHEAD = 8
-"""Frames that may be tracked before those behind are labelled."""
+_AHEAD = 16
+"""Frames that may be tracked before those behind are labelled: the objects of half a second are looked at in
+one go, and the tracker should not have to wait for that."""
 _STAGES = ("reading", "tracking", "segmenting", "linking", "writing")
 """Stages whose seconds are told; they run side by side."""
 _GIVEN_BACK = 250
