@@ -273,6 +273,7 @@ class Scene:
         The points seen in this frame.
     trails : (T, N, 2) float32
         Where these points were in the T frames up to this one, oldest first; NaN where they were not seen.
+        Read only.
     """
 
     frame: int

@@ -236,6 +236,14 @@ def test_scenes_follow_a_track_back_in_time():
     assert after([], slice(0), []).trails.shape == (3, 0, 2)
 
 
+def test_a_renderer_cannot_change_the_trails_of_later_scenes():
+    scenes = Scenes(VideoInfo(10, 10, Fraction(10)), trail_s=0.2)
+    points = FramePoints(np.array([4], np.int64), np.ones((1, 2), np.float32))
+    scene = scenes.next(points, np.zeros(1, np.int32))
+    with pytest.raises(ValueError, match="read-only"):
+        scene.trails[:] = 0
+
+
 @pytest.mark.parametrize("trail", [0, 1, 4])
 def test_trails_of_tracks_that_end_and_come_back(trail):
     """A trail is where its track was in each of the last frames, whatever happened in between."""

@@ -33,6 +33,7 @@ class Scenes:
     def next(self, points: FramePoints, labels: NDArray[np.int32]) -> Scene:
         """The scene of the next frame; its points are ordered by id."""
         self._trails = self._continued(points)
+        self._trails.flags.writeable = False  # the next scene goes on with them, whatever a renderer does
         self._past.append(points)
         if len(points.ids):
             self._largest_id = max(self._largest_id, int(points.ids[-1]))
