@@ -46,8 +46,8 @@ class _Sizes:
     @classmethod
     def of(cls, image: Image) -> _Sizes:
         diagonal = float(np.hypot(*image.shape[:2]))
-        # Radii of dots: the 0.6 is a rim of half a pixel that does not grow with the picture; without it dots
-        # of small pictures can hardly be seen.
+        # Radii of dots. The polygons in which they used to be drawn were wider by 0.6 than they said: the
+        # look was kept.
         return cls(
             dot=max(1.8, 0.6 + 0.0024 * diagonal),
             rim=max(0.5, 0.0007 * diagonal),
