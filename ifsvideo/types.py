@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.ordered import places
+
 if TYPE_CHECKING:
     from ifsvideo.objects.history import Event, ObjectTable
 
@@ -99,10 +101,8 @@ class FramePoints:
     def positions(self, ids: NDArray[np.int64]) -> NDArray[np.float32]:
         """Where some tracks are, (M, 2); NaN where one is not seen. These points must be ordered by id."""
         found = np.full((len(ids), 2), np.nan, dtype=np.float32)
-        if len(self.ids):
-            place = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)
-            same = self.ids[place] == ids
-            found[same] = self.xy[place[same]]
+        place, there = places(ids, self.ids)
+        found[there] = self.xy[place[there]]
         return found
 
 

@@ -9,7 +9,7 @@ from ifsvideo.config import ObjectsConfig
 from ifsvideo.objects.camera_fixed import CameraFixed
 from ifsvideo.tracking.steps import steps_of
 from ifsvideo.tracking.trajectories import Trajectories
-from ifsvideo.types import Tracks
+from ifsvideo.types import FramePoints, Tracks
 from tests.scenes import SIZE, Camera, Mover, make_scene
 
 CONFIG = ObjectsConfig()
@@ -109,3 +109,12 @@ def test_few_frames_fix_nothing(frames: int) -> None:
     short = Tracks.from_array(tracks.xy[:frames])
     assert not len(camera_fixed_tracks(Trajectories.from_tracks(short), CONFIG))
     assert not len(camera_fixed_tracks(Trajectories.from_tracks(short.select(np.arange(1))), CONFIG))
+
+
+def test_points_that_all_vanish_are_no_error() -> None:
+    """A fade to black: the frames since the last look have no points, the one before them had."""
+    fixed = CameraFixed(SIZE, 30.0, CONFIG)
+    for count in (5, 5, 0, 0, 3, 3):
+        fixed.add(FramePoints(np.arange(count), np.zeros((count, 2), np.float32)))
+        fixed.update()
+    assert not len(fixed.ids)

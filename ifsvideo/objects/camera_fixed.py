@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.config import ObjectsConfig
+from ifsvideo.ordered import places
 from ifsvideo.types import Bools, FramePoints
 
 SHAKE_TO_SPREAD = 6.0
@@ -78,7 +79,8 @@ class CameraFixed:
         still, moving = spread < bound, (spread >= bound) & (gone > 4 * bound)
         self.ids = np.setdiff1d(self.ids, ids[spread >= bound], assume_unique=True)
         # Of what has ended nobody asks any more once it is out of memory.
-        self.ids = np.intersect1d(self.ids, np.concatenate([frame.ids for frame in looks]))
+        seen = [places(self.ids, frame.ids)[1] for frame in looks]
+        self.ids = self.ids[np.any(seen, axis=0)]
         self._follow_world(ids, still, moving)
         self._judge(ids[still], spread[still], xy[:, still], unit)
 
@@ -117,14 +119,14 @@ class CameraFixed:
         """
         frames = list(self._frames)[-self._new - 1 :]
         self._new = 0
-        names, still, moving = np.append(ids, -1), np.append(still, False), np.append(moving, False)
         for before, after in pairwise(frames):
             there = after.positions(before.ids)
-            place = np.searchsorted(ids, before.ids)
-            known = (names[place] == before.ids) & np.isfinite(there[:, 0])
-            goes = known & moving[place]
-            counted = goes | (known & still[place])
-            step, goes, xy = (there - before.xy)[counted], goes[counted], before.xy[counted]
+            place, known = places(before.ids, ids)
+            known &= np.isfinite(there[:, 0])
+            place = place[known]
+            step, xy, goes = (there - before.xy)[known], before.xy[known], moving[place]
+            counted = goes | still[place]
+            step, xy, goes = step[counted], xy[counted], goes[counted]
             if goes.any() and self._share_owned(xy, goes) >= self._config.fixed_world_share:
                 self._common.append(np.median(step[goes], axis=0).astype(np.float64))
                 self._lengths.append(float(np.median(np.linalg.norm(step[goes], axis=1))))

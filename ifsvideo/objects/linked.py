@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifsvideo.objects.windows import Bounds
+from ifsvideo.ordered import places
 from ifsvideo.types import BACKGROUND, UNDECIDED, Bools
 
 _LEAST_AGREED = 20
@@ -66,8 +67,8 @@ class LinkedWindow:
 
     def _find(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools]:
         """Labels (N,) of tracks, -1 of those that the window has not, and whether it has decided of them."""
-        known = np.isin(ids, self.ids, assume_unique=True)
-        place = np.searchsorted(self.ids, ids[known])
+        place, known = places(ids, self.ids)
+        place = place[known]
         labels, decided = np.full(len(ids), UNDECIDED, dtype=np.int64), np.zeros(len(ids), dtype=bool)
         labels[known], decided[known] = self.labels[place], self.decided[place]
         return labels, decided

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ifsvideo.config import ObjectsConfig
 from ifsvideo.objects.camera_fixed import SHAKE_TO_SPREAD
 from ifsvideo.objects.parting import lengths, middle
+from ifsvideo.ordered import places
 from ifsvideo.types import BACKGROUND, FramePoints, Ints
 
 _LEAST_WORLD = 8
@@ -50,8 +51,7 @@ def still_objects(
     for (before, was), (after, now) in pairwise(zip(points, labels, strict=True)):
         if not (now > BACKGROUND).any():
             continue
-        place = np.minimum(np.searchsorted(after.ids, before.ids), len(after.ids) - 1)
-        both = after.ids[place] == before.ids
+        place, both = places(before.ids, after.ids)
         place = place[both]
         step = np.asarray(after.xy[place] - before.xy[both], np.float64)
         label = np.where(was[both] == now[place], now[place], -1)

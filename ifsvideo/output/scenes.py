@@ -7,6 +7,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.ordered import places
 from ifsvideo.types import FramePoints, Scene, VideoInfo
 
 
@@ -46,12 +47,11 @@ class Scenes:
         """The trails (T, N, 2) of these points: those of the frame before, where they were seen in it."""
         trails = np.full((len(self._past), len(points.ids), 2), np.nan, np.float32)
         trails[-1] = points.xy
-        _, before, now = np.intersect1d(
-            self._past[-1].ids, points.ids, assume_unique=True, return_indices=True
-        )
-        trails[:-1, now] = self._trails[1:, before]
-        back = points.ids <= self._largest_id
-        back[now] = False
+        if len(trails) == 1:
+            return trails
+        place, went_on = places(points.ids, self._past[-1].ids)
+        trails[:-1, went_on] = self._trails[1:, place[went_on]]
+        back = (points.ids <= self._largest_id) & ~went_on
         if back.any():  # seen earlier, but not in the frame before
             for positions, earlier in zip(trails[:-1], list(self._past)[1:], strict=True):
                 positions[back] = earlier.positions(points.ids[back])
