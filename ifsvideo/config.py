@@ -42,8 +42,9 @@ class TrackerConfig:
     """Most seconds between them: at 10 frames a second every frame is searched. There a car that passes
     loses a third of its points from one frame to the next, and would be bare for two more."""
     window: int = 11
-    """Side of the KLT window, pixels, odd. OpenCV's 21 drags background along within 10 px of a moving edge;
-    it can be compared by this setting and ``python -m ifsvideo.benchmark samples --config``."""
+    """Height of the KLT window, pixels, odd; its width is the nearest multiple of 8. OpenCV's 21 drags
+    background along within 10 px of a moving edge; it can be compared by this setting and
+    ``python -m ifsvideo.benchmark samples --config``."""
     max_return_error: float = 0.001
     """Greatest distance between a point and itself tracked forward and back, share of the diagonal: 0.7 px at
     640x360 (Kalal et al., Forward-Backward Error, ICPR 2010)."""

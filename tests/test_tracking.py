@@ -284,6 +284,40 @@ def test_window_and_levels_follow_the_picture() -> None:
     assert Search.for_picture(48, 48, 21).window < 12
 
 
+def test_the_window_is_as_wide_as_high_in_whole_lanes() -> None:
+    assert Search.for_picture(1280, 720, 11).size == (8, 11)
+    assert Search.for_picture(1280, 720, 21).size == (24, 21)
+    assert Search.for_picture(48, 48, 11).size == (8, 9)
+    assert Search.for_picture(640, 360, 5).size == (8, 5)
+
+
+def test_klt_is_given_that_window_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes: list[tuple[int, int]] = []
+
+    def spy(*args: Any, **kwargs: Any) -> Any:
+        sizes.append(kwargs["winSize"])
+        return calc(*args, **kwargs)
+
+    calc = cv2.calcOpticalFlowPyrLK
+    monkeypatch.setattr(cv2, "calcOpticalFlowPyrLK", spy)
+    run(warped(homographies(2)))
+    assert sizes == [(8, 11)] * 2
+
+
+def test_a_window_higher_than_wide_follows_alike_both_ways() -> None:
+    """The same plane, once as it is, once lying on its side."""
+    off = []
+    swap = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1.0]])
+    for side in (np.eye(3), swap):
+        size = (WIDTH, HEIGHT) if side is not swap else (HEIGHT, WIDTH)
+        plane, maps = texture(2 * WIDTH, 2 * HEIGHT), [side @ m for m in homographies(12)]
+        frames = [picture(cv2.warpPerspective(plane, m, size, flags=cv2.INTER_CUBIC)) for m in maps]
+        tracks = dense(run(frames))
+        off.append(errors(tracks, maps))
+        assert np.median(off[-1]) < 0.1
+    assert len(off[1]) == pytest.approx(len(off[0]), rel=0.1)
+
+
 def test_drift_check_measures_the_offset_and_sees_another_surface() -> None:
     plane = texture(400, 300, 10, blur=3)
     warp = np.array([[1.12, 0.1, 3], [-0.08, 1.06, 15]], np.float32)
