@@ -304,6 +304,20 @@ def test_klt_is_given_that_window_both_ways(monkeypatch: pytest.MonkeyPatch) -> 
     assert sizes == [(8, 11)] * 2
 
 
+def test_points_go_where_they_go_with_the_error_that_opencv_tells_by_default(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def default(*args: Any, **kwargs: Any) -> Any:
+        return calc(*args, **(kwargs | {"flags": 0}))
+
+    frames = warped(homographies(8))
+    calc, ours = cv2.calcOpticalFlowPyrLK, run(frames)
+    monkeypatch.setattr(cv2, "calcOpticalFlowPyrLK", default)
+    for a, b in zip(ours, run(frames), strict=True):
+        np.testing.assert_array_equal(a.ids, b.ids)
+        np.testing.assert_array_equal(a.xy, b.xy)
+
+
 def test_a_window_higher_than_wide_follows_alike_both_ways() -> None:
     """The same plane, once as it is, once lying on its side."""
     off = []

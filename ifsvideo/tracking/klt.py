@@ -97,6 +97,7 @@ def _flow(
         winSize=search.size,
         maxLevel=search.levels,
         criteria=STOP,
+        flags=cv2.OPTFLOW_LK_GET_MIN_EIGENVALS,  # at hand; the error told otherwise takes time, unread
     )
     return np.asarray(moved, np.float32).reshape(-1, 2), np.asarray(found).ravel() == 1
 
