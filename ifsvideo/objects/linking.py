@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
+from scipy.special import expit, logit
 
 from ifsvideo.objects.reappearance import Sight, match
 from ifsvideo.types import BACKGROUND, Bools, Tracks
+
+_SUREST = 1 - 1e-9
+"""Confidence that is as good as 1: another window's doubt counts beside it, too."""
 
 
 @dataclass
@@ -48,7 +52,7 @@ class Linker:
     _given: dict[int, Counter[int]] = field(default_factory=dict)
     _guessed: dict[int, Counter[int]] = field(default_factory=dict)
     _windows: Counter[int] = field(default_factory=Counter)
-    _surest: dict[int, float] = field(default_factory=dict)
+    _surest: dict[int, list[float]] = field(default_factory=dict)
     _sights: dict[int, Sight] = field(default_factory=dict)
     _next: int = 1
 
@@ -68,9 +72,11 @@ class Linker:
         """Number of windows in which an object was found."""
         return self._windows[number]
 
-    def surest(self, number: int) -> float:
-        """How sure of an object the window was that was surest, 0 to 1."""
-        return self._surest.get(number, 0.0)
+    def surest(self, number: int, windows: int = 1) -> float:
+        """How sure of an object so many of the surest windows were, 0 to 1: by the mean of their log odds, 0
+        where fewer found it; at most `least_windows`."""
+        surest = self._surest.get(number, [])[:windows]
+        return float(expit(np.mean(logit(surest)))) if len(surest) == windows else 0.0
 
     def forget(self, gone: NDArray[np.int64]) -> None:
         """Drop what is known of some tracks (T,) that have ended; one that comes again is a new one."""
@@ -141,8 +147,9 @@ class Linker:
             evidence.setdefault(int(tracks.ids[k]), Counter())[int(linked[k])] += 1
         for number in np.unique(linked[linked > BACKGROUND]).tolist():
             self._windows[number] += 1
-            here_sure = 1.0 if confidence is None else float(confidence[linked == number].max())
-            self._surest[number] = max(self.surest(number), here_sure)
+            here_sure = _SUREST if confidence is None else float(np.clip(confidence[linked == number].max(), 1 - _SUREST, _SUREST))
+            surest = [*self._surest.get(number, []), here_sure]
+            self._surest[number] = sorted(surest, reverse=True)[: max(1, self.least_windows)]
         self._sights |= lost | {number_for[label]: sight for label, sight in sights.items()}
         self._sights = {n: s for n, s in self._sights.items() if start - s.last <= self.longest_loss}
         return linked

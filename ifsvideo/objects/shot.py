@@ -268,11 +268,11 @@ class Shot:
         return np.split(labels, np.cumsum([len(frame.labels) for frame in frames])[:-1])
 
     def _counts(self, number: int) -> bool:
-        """Whether an object was found by enough windows, one of which was sure enough, or by one that was
-        surer than that."""
-        surest = self._linker.surest(number)
-        lasting = self._linker.windows_of(number) >= self._least_windows
-        return surest >= (self._config.least_confidence if lasting else self._config.alone_confidence)
+        """Whether an object was found by enough windows that were sure enough, or by one that was surer than
+        that."""
+        together = self._linker.surest(number, self._least_windows)
+        alone = self._linker.surest(number)
+        return together >= self._config.least_confidence or alone >= self._config.alone_confidence
 
 
 def _ids_of(frames: Sequence[Frame]) -> NDArray[np.int64]:
