@@ -3,8 +3,8 @@
 A pixel of the object looks in another frame like the place to which the object has carried it, a pixel of the
 ground like the place to which the ground has gone. What is covered or uncovered meanwhile looks like neither;
 but an outline covers on one side only of the time at which it is looked at, so frames before and after are
-asked and the better side counts. Where object and ground are plain both fit; there GrabCut decides, by the
-colours of what is told and by where the picture has edges (Rother et al., GrabCut, SIGGRAPH 2004).
+asked and the better side counts. Where object and ground are plain both fit; there colours decide, and where
+the picture has edges (`cut.py`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ifsvideo.objects.cut import cut
 from ifsvideo.types import Bools, Image
 
 _PIXELS = 12000
@@ -157,23 +158,16 @@ def find_silhouette(view: View, grey: Image, colours: Image, sides: Sequence[Seq
         Frames before, and frames after; one of them may have none.
     """
     log_ratio = _log_ratio(view, grey, sides)
-    told = np.full(log_ratio.shape, cv2.GC_PR_BGD, np.uint8)
-    told[log_ratio > 0] = cv2.GC_PR_FGD
-    border = np.ones(told.shape, bool)
+    likely = log_ratio > 0
+    if likely.all() or not likely.any():
+        return np.asarray(likely, bool)
+    border = np.ones(likely.shape, bool)
     border[1:-1, 1:-1] = False
-    told[border & (log_ratio <= 0)] = cv2.GC_BGD
-    told[cv2.erode((log_ratio > _SURE).astype(np.uint8), _BESIDE) > 0] = cv2.GC_FGD
-    told[cv2.erode((log_ratio < -_SURE).astype(np.uint8), _BESIDE) > 0] = cv2.GC_BGD
-    figure: Bools = told % 2 == 1
-    if figure.all() or not figure.any():
-        return figure
-    # It draws the first centres of its colours at random.
-    cv2.setRNGSeed(0)
-    models = np.zeros((2, 1, 65))
-    shown = _in_pixels(colours, view.columns, view.rows)
-    cv2.grabCut(shown, told, (0, 0, 1, 1), models[0], models[1], 1, cv2.GC_INIT_WITH_MASK)
-    # Where the picture is all edges GrabCut's outline may lie beside them: what is told stands.
-    return np.asarray((told % 2 == 1) & (log_ratio > -_SURE), bool)
+    sure = -(border & ~likely).astype(np.int8)
+    sure[cv2.erode((log_ratio > _SURE).astype(np.uint8), _BESIDE) > 0] = 1
+    sure[cv2.erode((log_ratio < -_SURE).astype(np.uint8), _BESIDE) > 0] = -1
+    # Where the picture is all edges the outline may lie beside them: what is told stands.
+    return cut(_in_pixels(colours, view.columns, view.rows), likely, sure) & (log_ratio > -_SURE)
 
 
 def _log_ratio(view: View, grey: Image, sides: Sequence[Sequence[Parted]]) -> NDArray[np.float32]:
