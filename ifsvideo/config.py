@@ -161,12 +161,12 @@ class ObjectsConfig:
     """Windows that must find an object, where the clip has so many: parallax and slipping corners that look
     like motion in one window seldom do so again in the next, which sees half of the same frames."""
     least_confidence: float = 0.99
-    """How sure of an object one of these windows must be. In handheld_no_movers.mp4 and the rendered static
-    drive (``python -m ifsvideo.benchmark static``) parallax at the picture's border and what windows mirror
-    stay below; at 0.98 they no longer do. A car or a person is 0.999 as soon as it moves for a second, a van
-    of a dozen points far ahead 0.99."""
+    """How sure of an object the surest ``least_windows`` windows must be together, by the mean of their log
+    odds. In handheld_no_movers.mp4 and the rendered static drive (``python -m ifsvideo.benchmark static``)
+    parallax at the picture's border and what windows mirror stay below in most runs; at 0.98 they do not. A
+    car or a person is 0.999 as soon as it moves for a second, a van of a dozen points far ahead 0.99."""
     alone_confidence: float = 0.9999
-    """How sure a window must be if no other finds the object."""
+    """How sure a window must be if no other finds the object, or none that is sure of it."""
     least_seconds: float = 0.5
     """What lives shorter is no object; its points go to the background."""
     longest_loss_s: float = 1.0

@@ -175,11 +175,14 @@ def test_what_no_window_is_sure_of_is_background_and_keeps_its_number_once_one_i
     def label(ids: np.ndarray, window: int) -> np.ndarray:
         return np.where(ids < 20, 1, 0)
 
-    def surest_window(number: int, sure: float) -> np.ndarray:
-        return label_clip(clip, Told(label, sure=lambda window: sure if window == number else 0.9), CONFIG)
+    def surest_window(number: int, sure: float, usual: float = 0.9) -> np.ndarray:
+        return label_clip(clip, Told(label, sure=lambda window: sure if window == number else usual), CONFIG)
 
     assert not surest_window(4, 0.98).any()
-    labels = surest_window(4, 0.999)
+    assert not surest_window(4, 0.993).any()
+    assert surest_window(4, 0.993, 0.987).any()
+    assert surest_window(4, 0.99995, 0.01).any()
+    labels = surest_window(4, 0.9995)
     assert numbers_of(clip, labels, np.arange(20)) == [0, 1]
     moving = clip.frame[labels > 0]
     assert 0 < moving.min() < 60  # two windows after the frame, its labels are final

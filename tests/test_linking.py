@@ -206,15 +206,22 @@ def test_an_object_in_sight_is_not_lost_though_a_window_misses_it() -> None:
     assert set(found[10:].tolist()) == {2}
 
 
-def test_an_object_is_as_sure_as_its_surest_window() -> None:
+def test_an_object_is_as_sure_as_its_surest_windows() -> None:
     linker = Linker(3)
     ids, ones = np.arange(5), np.ones(5, np.int64)
-    for confidence in (0.7, 0.9, 0.8):
+    linker.link(window(ids), ones, None, np.full(5, 0.7))
+    assert linker.surest(1) == pytest.approx(0.7)
+    assert linker.surest(1, 2) == 0.0
+    for confidence in (0.9, 0.8):
         linker.link(window(ids), ones, None, np.full(5, confidence))
-    assert linker.surest(1) == 0.9
+    assert linker.surest(1) == pytest.approx(0.9)
+    # Odds of 9 and 4 are in the mean, of their logarithms, odds of 6.
+    assert linker.surest(1, 2) == pytest.approx(6 / 7)
     assert linker.surest(2) == 0.0
     linker.link(window(ids), ones)
-    assert linker.surest(1) == 1.0
+    assert linker.surest(1) == pytest.approx(1.0)
+    linker.link(window(ids), ones, None, np.zeros(5))
+    assert linker.surest(1) == pytest.approx(1.0)
 
 
 def guessed_from(linker: Linker, ids: np.ndarray, labels: np.ndarray, decided: range) -> list[int]:

@@ -68,10 +68,6 @@ class Linker:
         """Tracks (T,) that windows called moving and could decide of."""
         return np.fromiter(self._given, np.int64, len(self._given))
 
-    def windows_of(self, number: int) -> int:
-        """Number of windows in which an object was found."""
-        return self._windows[number]
-
     def surest(self, number: int, windows: int = 1) -> float:
         """How sure of an object so many of the surest windows were, 0 to 1: by the mean of their log odds, 0
         where fewer found it; at most `least_windows`."""
@@ -147,8 +143,8 @@ class Linker:
             evidence.setdefault(int(tracks.ids[k]), Counter())[int(linked[k])] += 1
         for number in np.unique(linked[linked > BACKGROUND]).tolist():
             self._windows[number] += 1
-            here_sure = _SUREST if confidence is None else float(np.clip(confidence[linked == number].max(), 1 - _SUREST, _SUREST))
-            surest = [*self._surest.get(number, []), here_sure]
+            sure_here = 1.0 if confidence is None else float(confidence[linked == number].max())
+            surest = [*self._surest.get(number, []), min(max(sure_here, 1 - _SUREST), _SUREST)]
             self._surest[number] = sorted(surest, reverse=True)[: max(1, self.least_windows)]
         self._sights |= lost | {number_for[label]: sight for label, sight in sights.items()}
         self._sights = {n: s for n, s in self._sights.items() if start - s.last <= self.longest_loss}
