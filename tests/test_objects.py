@@ -10,9 +10,10 @@ import pytest
 
 from ifsvideo.objects.boxes import point_box, steady_boxes
 from ifsvideo.objects.contact import contact, stretch
-from ifsvideo.objects.events import KINDS, over_edge
+from ifsvideo.objects.events import KINDS, Sights, events_of, over_edge
 from ifsvideo.objects.history import ObjectHistory, ObjectTable
 from ifsvideo.objects.kinematics import foot_step, steps, velocity
+from ifsvideo.objects.margins import Margin
 from ifsvideo.types import Scene
 
 from .drives import FPS, HEIGHT, INFO, drive, history
@@ -233,6 +234,24 @@ class TestDrives:
         assert [event.kind for event in told][:2] == ["appears", "comes closer fast"]
         assert told[0].text == "object 1 starts to move"
         assert told[1].time_s > 1.7
+
+    @pytest.mark.parametrize(
+        ("measured_s", "since"), [([4.0], 5), ([5.0], 5), ([5.6], 20), ([4.0] * 3 + [6.1] + [4.0] * 6, 14)]
+    )
+    def test_growth_that_seems_up_to_half_as_fast_does_not_deny_that_contact_was_near(
+        self, measured_s: list[float], since: int
+    ):
+        """Contact is at 80 frames of 25 a second; what is measured before the 20th is too long."""
+        frame = np.arange(60, dtype=np.int32)
+        ttc = (80 - frame) / 25.0
+        ttc[:10], ttc[10:20] = np.nan, measured_s
+        ones, unknown = np.ones(60, np.int32), np.full(60, np.nan)
+        box = np.repeat(np.array([[200], [100], [40], [30], [220], [115], [0], [0]], np.float32), 60, axis=1)
+        nearing = np.array([1 / ttc, ttc, np.isfinite(ttc)], np.float32)
+        rows = ObjectTable(frame, frame / 25.0, ones, 9 * ones, *box, *nearing)
+        sights = Sights(rows, unknown, unknown, Margin(), Margin(), again=False, shot=(0, 60))
+        told = {event.kind: event.frame for event in events_of(sights, INFO)}
+        assert told["comes closer fast"] == pytest.approx(since, abs=1)
 
     def test_what_comes_in_too_fast_to_be_noticed_came_over_the_edge(self):
         told = history(

@@ -287,7 +287,7 @@ def _onset(sights: Sights, row: int, fps: float) -> int:
     rows = sights.rows
     contact = float(rows.frame[row] + rows.ttc_s[row] * fps)
     first = max(sights.first, int(np.ceil(contact - _CONTACT_S * fps)))
-    far = rows.frame[:row][rows.ttc_s[:row] >= _CONTACT_S]
+    far = rows.frame[:row][rows.ttc_s[:row] >= _UNSURE * _CONTACT_S]
     if len(far):
         first = max(first, int(far[-1]) + 1)
     between = (rows.frame >= first) & (rows.frame < rows.frame[row]) & np.isfinite(rows.scale_rate)
