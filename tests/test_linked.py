@@ -59,3 +59,20 @@ def test_a_window_that_took_an_object_for_the_world_is_denied() -> None:
     guessed = window(world, [False] * 40, ids=ids)
     assert not wrong.is_denied_by(guessed, right)
     assert not window(turned, [False] * 40, ids=ids).is_denied_by(right, right)
+
+
+def test_an_object_most_of_whose_tracks_stood_before_and_after_is_none() -> None:
+    """Nor are those of its tracks which only one of the two has seen, or neither."""
+    ids = np.arange(30)
+    between = window([1] * 28 + [2, 0], ids=ids)
+    # Decided before: that 22 moves, 23 stands; guessed: 24. After: that 24, 25 stand; guessed: 26.
+    before = window([0] * 20 + [0, 0, 3, 0, 3], [True] * 24 + [False], ids=ids[:25])
+    after = window([0] * 20 + [0, 0, 0], [True] * 22 + [False], ids=np.array([*range(20), 24, 25, 26]))
+    labels, guessed = between.say_of(ids, before, after)
+    assert labels.tolist() == [0] * 20 + [0, 0, 3, 0, 0, 0, 0, -1, 2, 0]
+    assert np.flatnonzero(guessed).tolist() == [26, 27]
+
+    few = window([0] * 19, ids=ids[:19])
+    assert between.say_of(ids, few, few)[0].tolist() == [0] * 19 + [1] * 9 + [2, 0]
+    half = window([0] * 13 + [1] * 13, ids=ids[:26])
+    assert between.say_of(ids, half, half)[0].tolist() == [0] * 13 + [1] * 15 + [2, 0]

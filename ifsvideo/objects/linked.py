@@ -12,7 +12,7 @@ from ifsvideo.ordered import places
 from ifsvideo.types import BACKGROUND, UNDECIDED, Bools
 
 _LEAST_AGREED = 20
-"""Tracks of which two windows must agree to deny the one between."""
+"""Tracks of which two windows must agree to deny the one between, or what it found."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,18 @@ class LinkedWindow:
 
         Windows overlap by half, so that those before and after see together what this one sees: where they
         agree whether a track moves, they outvote it. An object stands for half a window less often than a
-        window takes it for the world, and all else for an object.
+        window takes it for the world, and all else for an object. Of an object most of whose tracks they take
+        for background, the others, too, are what one of them says: a piece of ground that for once seems to
+        move has tracks that only one of them sees.
         """
         labels, decided = self._find(ids)
         if before is not None and after is not None:
             agreed, first = _agreed(ids, before, after)
             outvoted = agreed & ((first > BACKGROUND) != (labels > BACKGROUND))
+            denied = np.isin(labels, self._denied(before, after)) & ~agreed
             labels = np.where(outvoted, first, labels)
+            if denied.any():
+                labels[denied], decided[denied] = _said_by_either(ids[denied], before, after)
         return labels, ~decided
 
     def is_denied_by(self, before: LinkedWindow, after: LinkedWindow) -> bool:
@@ -64,6 +69,14 @@ class LinkedWindow:
         wrong = agreed & ((first > BACKGROUND) != (self.labels > BACKGROUND))
         count = np.count_nonzero(agreed)
         return bool(count >= _LEAST_AGREED and 2 * np.count_nonzero(wrong) > count)
+
+    def _denied(self, before: LinkedWindow, after: LinkedWindow) -> NDArray[np.int64]:
+        """The objects (K,) most of whose tracks, of which the windows before and after agree, do not move."""
+        agreed, first = _agreed(self.ids, before, after)
+        agreed &= self.decided & (self.labels > BACKGROUND)
+        count = np.bincount(self.labels[agreed])
+        still = np.bincount(self.labels[agreed & (first == BACKGROUND)], minlength=len(count))
+        return np.flatnonzero((count >= _LEAST_AGREED) & (2 * still > count))
 
     def _find(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools]:
         """Labels (N,) of tracks, -1 of those that the window has not, and whether it has decided of them."""
@@ -81,3 +94,14 @@ def _agreed(
     first, was_decided = before._find(ids)
     second, is_decided = after._find(ids)
     return (first == second) & (first != UNDECIDED) & was_decided & is_decided, first
+
+
+def _said_by_either(
+    ids: NDArray[np.int64], before: LinkedWindow, after: LinkedWindow
+) -> tuple[NDArray[np.int64], Bools]:
+    """Labels (N,) of tracks by that of two windows which has decided of them, or else has them, by the one
+    before if both; and whether it has decided."""
+    first, was_decided = before._find(ids)
+    second, is_decided = after._find(ids)
+    by_first = was_decided | (~is_decided & (first != UNDECIDED))
+    return np.where(by_first, first, second), was_decided | is_decided
