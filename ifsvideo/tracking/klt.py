@@ -17,7 +17,7 @@ MIN_WINDOW = 9
 """Least height of the window, pixels: fewer pixels do not fix a displacement against noise."""
 LANES = 8
 """Pixels of a row that OpenCV computes at once. What is left of a row it takes one by one: a window 11 pixels
-wide takes 1.7 times the time of one of 8."""
+wide takes far longer than one of 8 (`ifsvideo/benchmark/TRIED.md`)."""
 MAX_LEVELS = 4
 """Most levels above the picture itself; on a coarser one, neighbours blend into the window."""
 FLAT_RADIUS = 8
