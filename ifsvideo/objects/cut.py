@@ -22,14 +22,9 @@ _SMOOTH = 100.0
 directions outlines are as dear as by GrabCut's 50 on eight neighbours."""
 _DECIDED = 5.0
 """Evidence, in costs of an outline, of a pixel that is told: more than its four neighbours can outweigh."""
-_STEPS = (60, 60)
+_STEPS = (60, 120)
 """Steps in half, and in all of the rows and columns: the last make outlines exact, the first a good start.
 With others a soft shadow that goes along may stay with the object (`ifsvideo/benchmark/TRIED.md`)."""
-_WEIGHT = np.float32(0.25)
-"""The flow's step: with 0.125 and 0.35 outlines are further from the best after as many steps."""
-_FARTHER = 1.8
-"""How far each step goes of the one found: below 2, where it no longer converges, the farther the faster
-(Condat, A primal-dual splitting method, JOTA 2013)."""
 _LEARN = 2
 """Of so many rows and columns one is taken to learn colours: as exact, in a third of the time."""
 _GREY = 1.0
@@ -93,28 +88,28 @@ def _approach(
     """Flow and share of the object in each pixel, so many steps nearer to the best."""
     columns = evidence.shape[1]
     # In a row of all pixels the next of the row is one away and that of the column a row; no flow goes over
-    # the end of a row. Shares count `_WEIGHT` times, which spares to multiply the flow's steps.
-    here, most = evidence.reshape(1, -1), bounds.reshape(2, -1)
-    flows, now = flow.reshape(2, -1).copy(), share.reshape(1, -1) * _WEIGHT
-    low, change, flowing = -most, np.zeros_like(flows), np.empty_like(flows)
+    # the end of a row. Shares count half, which spares the flow's step of a half.
+    here, most = evidence.ravel(), bounds.reshape(2, -1)
+    flows, now = flow.reshape(2, -1), share.ravel() * np.float32(0.5)
+    low, ahead, change = -most, now.copy(), np.zeros_like(flows)
     along, down = change[0, :-1], change[1, :-columns]
-    following, ahead = np.empty_like(now), np.empty_like(now)
+    following = np.empty_like(now)
     for _ in range(steps):
-        _left(here[0], flows, columns, ahead[0])
-        # With the flow's step, which is the weight, the largest for which this converges.
-        cv2.scaleAdd(ahead, 0.125, now, following)
-        np.minimum(following, _WEIGHT, out=following)
+        np.subtract(ahead[:-1], ahead[1:], out=along)
+        np.subtract(ahead[:-columns], ahead[columns:], out=down)
+        flows += change
+        np.minimum(flows, most, out=flows)
+        np.maximum(flows, low, out=flows)
+        _left(here, flows, columns, following)
+        # A quarter of the half: with the flow's step the largest for which this converges.
+        following *= np.float32(0.125)
+        following += now
+        np.minimum(following, np.float32(0.5), out=following)
         np.maximum(following, np.float32(0), out=following)
-        cv2.addWeighted(following, 2, now, -1, 0, ahead)
-        np.subtract(ahead[0, :-1], ahead[0, 1:], out=along)
-        np.subtract(ahead[0, :-columns], ahead[0, columns:], out=down)
-        np.add(flows, change, out=flowing)
-        np.minimum(flowing, most, out=flowing)
-        np.maximum(flowing, low, out=flowing)
-        cv2.addWeighted(flowing, _FARTHER, flows, 1 - _FARTHER, 0, flows)
-        cv2.addWeighted(following, _FARTHER, now, 1 - _FARTHER, 0, now)
-    shares = np.asarray(following / _WEIGHT, np.float32)
-    return flowing.reshape(flow.shape), shares.reshape(share.shape)
+        np.subtract(following, now, out=ahead)
+        ahead += following
+        now, following = following, now
+    return flows.reshape(flow.shape), (2 * now).reshape(share.shape)
 
 
 def _left(evidence: Floats, flows: Floats, columns: int, out: Floats) -> None:
